@@ -156,9 +156,8 @@ def layout(
     place = _columns if vertical else _rows
     inks = place(lines, font)
     x0, y0, x1, y1 = _bounds(inks)
-    moved = [ink._replace(x=(ink.x - x0), y=(ink.y - y0)) for ink in inks]
     size = (round((x1 - x0) * cap_mm, 1), round((y1 - y0) * cap_mm, 1))
-    return Lettering(size, tuple(_placed(ink, font, cap_mm) for ink in moved))
+    return Lettering(size, tuple(_placed(ink, font, cap_mm) for ink in _moved(inks, -x0, -y0)))
 
 
 def ink_width_mm(text: str, font: Font, cap_mm: float) -> float:
@@ -205,26 +204,25 @@ def _part_inks(part: TextPart, font: Font, cap_mm: float) -> list[_Ink]:
     if part.pitch_mm:
         pitch = part.pitch_mm / cap_mm
         places = [i for i, char in enumerate(part.text) if char != " "]
-        if part.vertical:
-            inks = [ink._replace(y=-i * pitch) for i, ink in zip(places, inks, strict=True)]
-        else:
-            inks = [
-                ink._replace(x=i * pitch - ink.width / 2)
-                for i, ink in zip(places, inks, strict=True)
-            ]
+        inks = [
+            _Ink(char, x, -i * pitch, width)
+            if part.vertical
+            else _Ink(char, i * pitch - width / 2, y, width)
+            for i, (char, x, y, width) in zip(places, inks, strict=True)
+        ]
     left, low, _, _ = _bounds(inks)
-    right, up = part.x_mm / cap_mm - left, part.y_mm / cap_mm - low
-    return [ink._replace(x=ink.x + right, y=ink.y + up) for ink in inks]
+    return _moved(inks, part.x_mm / cap_mm - left, part.y_mm / cap_mm - low)
+
+
+def _moved(inks: Sequence[_Ink], right: float, up: float) -> list[_Ink]:
+    return [_Ink(char, x + right, y + up, width) for char, x, y, width in inks]
 
 
 def _bounds(inks: Sequence[_Ink]) -> tuple[float, float, float, float]:
     """Return left, lowest baseline, right and capitals' top of inks, in cap heights."""
-    return (
-        min(ink.x for ink in inks),
-        min(ink.y for ink in inks),
-        max(ink.x + ink.width for ink in inks),
-        max(ink.y for ink in inks) + 1.0,
-    )
+    lines = [ink.y for ink in inks]
+    right = max([ink.x + ink.width for ink in inks])
+    return min([ink.x for ink in inks]), min(lines), right, max(lines) + 1.0
 
 
 def _placed(ink: _Ink, font: Font, cap_mm: float) -> PlacedGlyph:

@@ -11,7 +11,7 @@ import numpy as np
 from fastgen.config.markings import ChalkConfig
 from fastgen.sampling.damage_spots import Spot
 from fastgen.sampling.sheet import EDGE_MM, Sheet, has_slots, tenth
-from fastgen.sampling.streams import Streams
+from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import Color, Decal, Vec2
 from fastgen.validation import Range
 
@@ -87,7 +87,7 @@ def sample_chalk(
 
 def _nowhere(config: ChalkConfig, faces: Mapping[str, Sheet], rng: np.random.Generator) -> Spot:
     """Return a place without a damage of its own. Small ones are more frequent."""
-    sheet = faces[str(rng.choice(sorted(faces)))]
+    sheet = faces[one_of(rng, sorted(faces))]
     low, high = np.log(config.around_mm)
     width, height = np.exp(rng.uniform(low, high, 2))
     x, y = (rng.uniform(EDGE_MM, max(side - EDGE_MM, EDGE_MM + 1)) for side in sheet.size)

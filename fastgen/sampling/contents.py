@@ -18,7 +18,7 @@ from fastgen.sampling.repairs import sample_repairs
 from fastgen.sampling.runs import sample_runs
 from fastgen.sampling.seals import sample_seals
 from fastgen.sampling.sheet import Sheet
-from fastgen.sampling.streams import Streams
+from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import (
     Ageing,
     Container,
@@ -58,7 +58,7 @@ def sample_contents(
         streams: Function from the name of a property to its independent random generator.
         color: Name of its paint; None to draw one.
     """
-    scale = float(streams("corrugation").choice(config.container.depth_scale))
+    scale = float(one_of(streams("corrugation"), config.container.depth_scale))
     container = Container(kind, config.container.profiles.deepened(scale))
     surface = _surface(config.surface, streams, color)
     damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
@@ -116,7 +116,7 @@ def _surface(c: SurfaceConfig, streams: Streams, color: str | None) -> Surface:
     shares = weights / weights.sum() if c.color_weights else None
     name = str(streams("paint.color").choice(list(c.colors), p=shares)) if color is None else color
     rust = streams("rust")
-    rust_color = str(streams("rust.color").choice(c.rust_colors))
+    rust_color = one_of(streams("rust.color"), c.rust_colors)
     # The square makes heavily rusted containers rare.
     low, high = c.rust_coverage
     coverage = low + (high - low) * float(rust.random()) ** 2

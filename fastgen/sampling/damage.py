@@ -9,7 +9,7 @@ import numpy as np
 
 from fastgen.config.damage import DamageConfig
 from fastgen.damages.draws import FRAME_MM, rounded_vector, turned
-from fastgen.sampling.streams import Streams
+from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import Damage, Vec3
 from fastgen.scene.damage_kinds import SheetForm, kind_named
 from fastgen.scene.limits import MAX_INSTANCES
@@ -70,7 +70,7 @@ def sample_damages(
             damages.append(kind.place(ranges, size_mm, rng))
             continue
         assert kind.draw is not None, "a kind has either draw or place"
-        plane = planes[str(rng.choice(config.faces))]
+        plane = planes[one_of(rng, config.faces)]
         form = kind.draw(ranges, plane.face, plane.size, rng)
         damages.append(_on_sheet(kind.name, form, plane, rng))
         rng = streams(f"damage.{i}.scrape")

@@ -8,7 +8,6 @@ import numpy as np
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.identifier_layout import (
     LAYOUTS,
-    TYPE_PLACES,
     Form,
     identifier_lines,
     identifier_parts,
@@ -79,7 +78,7 @@ def _forms(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generator) -> li
 def _form(
     layout: str, cap_mm: float, boxed: bool, pitch_mm: float, rng: np.random.Generator
 ) -> Form:
-    type_place = str(rng.choice(TYPE_PLACES[layout], p=_TYPE_SHARES[layout]))
+    type_place = weighted_choice(rng, _TYPE_PLACES[layout])
     upright = layout == "column"
     if upright:
         pitch_mm = float(rng.uniform(GLYPH_PITCH_CAPS - 0.1, GLYPH_PITCH_CAPS + 0.1)) * cap_mm
@@ -97,8 +96,12 @@ def _form(
     )
 
 
-_TYPE_SHARES = {"rows": (0.6, 0.25, 0.15), "block": (1.0,), "column": (0.5, 0.25, 0.25)}
-"""Probabilities of TYPE_PLACES."""
+_TYPE_PLACES = {
+    "rows": {"under serial": 0.6, "under owner": 0.25, "same line": 0.15},
+    "block": {"below": 1.0},
+    "column": {"beside, top": 0.5, "beside, bottom": 0.25, "below": 0.25},
+}
+"""Probabilities of the places of the size-type code, by layout."""
 
 
 def _written(style: Style, form: Form) -> tuple[Decal, Lettering]:

@@ -4,6 +4,7 @@ import numpy as np
 
 from fastgen.config.fields import linear_color
 from fastgen.config.lamps import LampsConfig
+from fastgen.sampling.streams import one_of
 from fastgen.scene.optics import Lamp
 
 
@@ -19,7 +20,7 @@ def sample_lamps(
     """
     if illuminance_lx >= config.below_lx or rng.random() >= config.probability:
         return ()
-    color = linear_color(str(rng.choice(config.colors)))
+    color = linear_color(one_of(rng, config.colors))
     return tuple(
         Lamp(
             azimuth_deg=round(config.azimuth_deg.draw(rng), 2),

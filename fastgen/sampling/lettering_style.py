@@ -11,7 +11,7 @@ from fastgen.decals.glyphs import Font, font_named
 from fastgen.decals.iso6346 import Identifier, sample_identifier
 from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.sampling.sheet import Sheet
-from fastgen.sampling.streams import Streams, weighted_choice
+from fastgen.sampling.streams import Streams, one_of, weighted_choice
 from fastgen.scene import REC_709, Color, Decal, Vec2
 from fastgen.scene.container_kinds import SIZE_TYPES
 from fastgen.validation import Range
@@ -39,7 +39,7 @@ def sample_style(config: MarkingsConfig, kind: str, paint: Color, streams: Strea
     """Sample font, colour, brand and identifier of a container."""
     rng = streams("lettering")
     names, _ = config.drawn_fonts()
-    font = font_named(str(rng.choice(names)))
+    font = font_named(one_of(rng, names))
     light = float(np.array(paint) @ REC_709) < 0.22
     albedo = _LIGHT if light else _DARK
     if rng.random() < config.colored_lettering:
@@ -67,8 +67,7 @@ def _brand(config: MarkingsConfig, rng: np.random.Generator) -> Brand:
     ]
     weights = [config.bundled_brand_weight] * len(bundled)
     weights += [each.weight for each in config.brands.values()]
-    shares = np.array(weights) / sum(weights)
-    return (*bundled, *own)[int(rng.choice(len(shares), p=shares))]
+    return weighted_choice(rng, dict(zip((*bundled, *own), weights, strict=True)))
 
 
 def _identifier(config: IdentifierConfig, kind: str, brand: Brand, streams: Streams) -> Identifier:

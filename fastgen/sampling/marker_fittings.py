@@ -11,7 +11,7 @@ from fastgen.decals.artwork import un_numbers
 from fastgen.decals.glyphs import glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.sampling.sheet import GAP_MM, Sheet, between, tenth
-from fastgen.sampling.streams import Streams
+from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import Color, Decal, Vec2
 from fastgen.validation import Range
 
@@ -98,7 +98,7 @@ def _panel(
     hazard, numbers = _panel_numbers(config, marker.class_name)
     if not numbers:
         return []
-    number = str(rng.choice(numbers))
+    number = one_of(rng, numbers)
     reach = np.array(marker.size_mm) / 2
     low = np.array([m.center_mm for m in markers]).min(axis=0) - reach
     high = np.array([m.center_mm for m in markers]).max(axis=0) + reach

@@ -8,7 +8,7 @@ import numpy as np
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.artwork import marker_prints
 from fastgen.sampling.sheet import Sheet, between, tenth
-from fastgen.sampling.streams import Streams
+from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import Decal, Vec2
 from fastgen.validation import Range
 
@@ -91,7 +91,7 @@ def sample_markers(config: MarkingsConfig, sheet: Sheet, streams: Streams) -> li
 def _print(config: MarkingsConfig, class_name: str, rng: np.random.Generator) -> dict[str, Any]:
     """Sample the appearance of one marker: artwork, tint, bleaching and torn corners."""
     own = class_name in config.markers and config.markers[class_name].art
-    art = str(rng.choice((f"marker/{class_name}",) if own else marker_prints()[class_name]))
+    art = f"marker/{class_name}" if own else one_of(rng, marker_prints()[class_name])
     tint = rng.uniform(0.86, 0.98) + rng.uniform(-0.02, 0.02, 3)
     fade = rng.uniform(*config.marker_fade)
     # Corners that show the class digit are torn less often, or the class would be unknown.

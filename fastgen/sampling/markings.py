@@ -20,7 +20,7 @@ from fastgen.sampling.marks import sample_marks
 from fastgen.sampling.painted_over import sample_painted_over
 from fastgen.sampling.sheet import EDGE_MM, Sheet, between, tenth
 from fastgen.sampling.stickers import sample_patches, sample_stickers, stickers_of
-from fastgen.sampling.streams import Streams
+from fastgen.sampling.streams import Streams, one_of
 from fastgen.sampling.weights_panel import sample_weights
 from fastgen.scene import Color, Decal
 from fastgen.validation import Range
@@ -103,7 +103,7 @@ def _brand(
             low = tenth(center[1] - size[1] / 2 + word.size_mm[1] / 2)
             made += [mark, placed(word, sheet, (center[0], low))]
     if rng.random() < config.main_text.get(sheet.face, 0.0):
-        line = str(rng.choice(style.brand.main_texts))
+        line = one_of(rng, style.brand.main_texts)
         text = text_decal((line,), between(rng, Range(70, 130 if small else 240)), style, 0.2)
         center = sheet.place(text.size_mm, rng, Range(0.0, 1.0), Range(0.0, 1.0))
         if center:

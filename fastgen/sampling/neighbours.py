@@ -14,7 +14,7 @@ from fastgen.errors import ConfigError
 from fastgen.sampling.arrangements import Plan, Site, sample_plan
 from fastgen.sampling.contents import Contents, of_neighbours, sample_contents
 from fastgen.sampling.sight import Sight
-from fastgen.sampling.streams import Streams, weighted_choice
+from fastgen.sampling.streams import Streams, one_of, weighted_choice
 from fastgen.scene import Camera, Ground, Neighbour, Pose, Prop, Vec3
 from fastgen.scene.boxes import (
     OrientedBox,
@@ -143,7 +143,7 @@ def sample_ground(
         albedo=(red, green, blue),
         wetness=round(wetness, 4),
         wear=round(config.wear.draw(streams("ground.wear")), 4),
-        line_albedo=linear_color(str(streams("ground.line_color").choice(config.line_colors))),
+        line_albedo=linear_color(one_of(streams("ground.line_color"), config.line_colors)),
         lines=round(config.line_paint.draw(lines), 4) if painted else 0.0,
         line_yaw_deg=round(config.line_yaw_deg.draw(lines), 3),
         line_spacing_mm=round(config.line_spacing_mm.draw(lines), 1),

@@ -10,7 +10,7 @@ from fastgen.config.markings import RepairsConfig
 from fastgen.sampling.colors import fresh_paint, mixed
 from fastgen.sampling.damage_spots import Spot
 from fastgen.sampling.sheet import Sheet, between, half_extent, has_slots, tenth
-from fastgen.sampling.streams import Streams
+from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import Color, Decal, Surface, Vec2
 from fastgen.validation import Range
 
@@ -143,7 +143,7 @@ def _placed(
     """Move the parts of a repair from the origin to a free place, none if there is none."""
     ends = [np.abs(part.center_mm) + half_extent(part) for part in parts]
     width, height = (2 * float(end) for end in np.max(ends, axis=0))
-    face, center = str(rng.choice(sorted(faces))), None
+    face, center = one_of(rng, sorted(faces)), None
     tries = _TRIES if spots and rng.random() < config.at_damage else 0
     for _ in range(tries):
         spot = spots[int(rng.integers(len(spots)))]

@@ -30,7 +30,7 @@ from fastgen.sampling.neighbours import (
     streams_of,
 )
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
-from fastgen.sampling.streams import Streams, weighted_choice
+from fastgen.sampling.streams import Streams, one_of, weighted_choice
 from fastgen.scene import (
     Camera,
     EnvironmentView,
@@ -193,7 +193,7 @@ def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     gap = rounded_gap_mm(c, c.gap_mm.draw(streams("spreader.gap")))
     return Spreader(
         present=bool(streams("spreader").random() < c.probability),
-        albedo=linear_color(str(streams("spreader.color").choice(c.colors))),
+        albedo=linear_color(one_of(streams("spreader.color"), c.colors)),
         flippers_down=(bool(lowered[0]), bool(lowered[1])),
         gap_mm=gap,
     )

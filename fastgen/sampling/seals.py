@@ -4,7 +4,7 @@ import numpy as np
 
 from fastgen.config.config import SealsConfig
 from fastgen.config.fields import linear_color
-from fastgen.sampling.streams import Streams, weighted_choice
+from fastgen.sampling.streams import Streams, one_of, weighted_choice
 from fastgen.scene import Seal
 
 _HASP_WEIGHTS = (1.0, 1.0, 3.0, 3.0)
@@ -29,7 +29,7 @@ def sample_seals(config: SealsConfig, streams: Streams) -> tuple[Seal, ...]:
             kind=weighted_choice(rng, config.kinds),
             hasp=hasp,
             state="hanging" if rng.random() < config.hanging else "locked",
-            albedo=linear_color(str(rng.choice(config.colors))),
+            albedo=linear_color(one_of(rng, config.colors)),
         )
         for hasp in sorted(hasps.tolist())
     )

@@ -14,7 +14,7 @@ from fastgen.config.sensor import (
     SharpeningConfig,
     WeatherConfig,
 )
-from fastgen.sampling.streams import Streams
+from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene.optics import (
     ChromaNoise,
     Defocus,
@@ -202,8 +202,8 @@ def _sharpening(config: SharpeningConfig, rng: np.random.Generator) -> Sharpenin
 def _stamp(config: SensorConfig, moment: datetime, rng: np.random.Generator) -> Stamp | None:
     if rng.random() >= config.stamp.probability:
         return None
-    shape = str(rng.choice(["%Y-%m-%d", "%d/%m/%Y", "%d.%m.%Y", "%Y/%m/%d"]))
-    corner = str(rng.choice(config.stamp.corners))
+    shape = one_of(rng, ("%Y-%m-%d", "%d/%m/%Y", "%d.%m.%Y", "%Y/%m/%d"))
+    corner = one_of(rng, config.stamp.corners)
     text = moment.strftime(f"{shape} %H:%M:%S")
     return Stamp(text, corner, _drawn(rng, config.stamp.height))
 

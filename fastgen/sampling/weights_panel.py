@@ -44,11 +44,12 @@ def sample_weights(
         gap = (between(rng, BAR_GAP_MM), between(rng, BAR_GAP_MM))
         columns = sum(gap) + bar[1] - bar[0] if beside else None
         parts, across = _parts(lines, inked, height, step, columns)
-        text, lettering = part_text(lines, parts, height, inked, False)
         start = bar[0] - gap[0] - across if beside else bar[1] + gap[1]
-        width, tall = lettering.size_mm
+        width = max(part.x_mm + ink_width_mm(part.text, inked.font, height) for part in parts)
         if not door.holds_lettering(start, start + width):
             continue
+        text, lettering = part_text(lines, parts, height, inked, False)
+        width, tall = lettering.size_mm
         for _ in range(_TRIES):
             y = tall / 2 + rng.uniform(0.05, 0.95) * (door.size[1] - tall)
             center = (tenth(start + width / 2), tenth(y))
