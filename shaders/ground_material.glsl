@@ -92,7 +92,7 @@ GroundMaterial ground_material(vec2 at_mm, Footprint f) {
 #endif
     albedo *= max(tone, 0.05);
 
-    float line = bands_cover(on_lines.x + 0.5 * line_spacing_mm, line_spacing_mm, 130.0, filter_width.x);
+    float line = bands_cover(on_lines.x + 0.5 * line_spacing_mm, line_spacing_mm, LINE_MM, filter_width.x);
     // Paint stays longest on high places and goes first under wheels.
     float paint = covered(fma(0.6, broad.value.x - 0.5, fine.value.y), line_threshold, fine.lost.y, 0.2);
     vec3 line_tone = line_albedo * (1.0 - 0.35 * ground_wear * (1.0 - broad.value.x)) *

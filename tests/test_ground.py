@@ -12,6 +12,7 @@ from fastgen.camera.projection import view_of
 from fastgen.light.environment import Ambient, load_environment, sky_irradiance, to_map_frame
 from fastgen.light.ground_light import LOW_GAP_M, form_factors, ground_light
 from fastgen.light.hdri import bundled_hdris
+from fastgen.light.octahedral import octahedral_encode
 from fastgen.render.gl import open_context
 from fastgen.scene import (
     Camera,
@@ -286,6 +287,33 @@ def test_sky_share_equals_a_monte_carlo_integral(ambient, poses, height_mm, tole
     assert len(errors) > 20
     assert np.abs(errors).max() < tolerance + 4 * 0.5 / np.sqrt(count)
     assert abs(np.mean(errors)) < 0.01
+
+
+@pytest.mark.parametrize("name", ["venice", "sky"])
+def test_what_boxes_hide_of_a_sky_has_its_color_there(name):
+    """Beside a container the mean color of the rest of the sky is not that of the whole sky."""
+    ambient = Ambient.of(load_environment(bundled_hdris()[name]))
+    box = container_box("40", Pose())
+    light = ground_light([box], [(0.0, 0.0, 0.0)], ambient, YAW_DEG, 0.0)
+    (whole,) = sky_irradiance(ambient, [[0.0, 0.0, 1.0]], YAW_DEG)
+    rng = np.random.default_rng(3)
+    rays = rng.normal(size=(40_000, 3))
+    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) + (0.0, 0.0, 1.0)
+    uv = octahedral_encode(to_map_frame(rays, YAW_DEG))
+    side = len(ambient.sky)
+    column, row = np.clip((uv * side).astype(int), 0, side - 1).T
+    radiance = ambient.sky[row, column]
+    np.testing.assert_allclose(radiance.mean(axis=0), whole, rtol=0.03)
+    errors, of_whole = [], []
+    for x, y in ((0.0, -2.0), (3.0, 3.5), (-7.5, 0.5), (0.0, 5.0), (7.0, -3.0), (-4.0, -2.5)):
+        start = np.array([1e3 * x, 1e3 * y, 1.0])
+        enters, leaves = box.crossed(start, rays)
+        seen = ~((enters < leaves) & (leaves > 0))
+        expected = (radiance * seen[:, None]).mean(axis=0)
+        errors.append(light.at(np.array([[x, y]]))[0, :3] / expected - 1)
+        of_whole.append(whole * seen.mean() / expected - 1)
+    assert np.abs(errors).mean() < 0.5 * np.abs(of_whole).mean()
+    assert np.abs(errors).max() < 0.15
 
 
 def test_light_on_open_ground_is_that_of_the_sky_and_paint_colors_its_foot(ambient):

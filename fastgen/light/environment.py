@@ -34,6 +34,7 @@ _LUMINANCE_FLOOR = 1e-6  # keeps one black texel from turning a log average to 0
 _DARKEST = 1e-5  # darker maps show the steps of half floats
 _BRIGHTEST = 1e4  # radiance up to six times the mean still fits half floats
 _SKY_CELLS = 42  # along a side of `Ambient.sky`; 5 degrees each
+_MEANS_SIZE = 16  # texels along a side of the map of hidden_sky
 _LIGHTS_WIDTH = 2048  # a texel is a third of the diameter of the sun
 _MAX_WORK_WIDTH = 8192  # a background texel covers about two of its texels
 
@@ -293,6 +294,34 @@ def lower_irradiance(env: Ambient, normals: ArrayLike, yaw_deg: float) -> NDArra
     radiance = env.sky.reshape(-1, 3)
     part = (facing * (cells[:, 2] < 0)) @ radiance / np.maximum(facing @ radiance, 1e-9)
     return np.asarray(sky_irradiance(env, normals, yaw_deg) * part, np.float32)
+
+
+def hidden_sky(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
+    """Return the radiance of the sky that something in each world direction [K, 3] hides.
+
+    It is the mean above the horizon in a lobe that falls to half at 33 degrees, about the extent of
+    a container near by, without `env.lights`.
+
+    Returns:
+        float32 [K, 3].
+    """
+    return octahedral.sample_octahedral(_means_above(env), to_map_frame(directions, yaw_deg))
+
+
+@functools.lru_cache(maxsize=8)
+def _means_above(env: Ambient) -> NDArray[np.float32]:
+    """Return `hidden_sky` as an octahedral map with a border, in the frame of the environment."""
+    cells, solid_angle = _sky_geometry(env.sky.shape[0])
+    toward, _ = octahedral.octahedral_texels(_MEANS_SIZE)
+    weight = np.maximum(toward.astype(np.float32) @ cells.T, 0.0) ** 4
+    weight *= solid_angle * (cells[:, 2] > 0)
+    means = weight @ env.sky.reshape(-1, 3) / np.maximum(weight.sum(axis=1), 1e-9)[:, None]
+    side = _MEANS_SIZE + 2 * octahedral.BORDER
+    found = np.zeros((side, side, 3), np.float32)
+    inside = slice(octahedral.BORDER, -octahedral.BORDER)
+    found[inside, inside] = means.reshape(_MEANS_SIZE, _MEANS_SIZE, 3)
+    octahedral.fill_border(found)
+    return found
 
 
 @functools.cache

@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastgen.light.environment import Ambient, sky_irradiance, to_map_frame
+from fastgen.light.environment import Ambient, hidden_sky, sky_irradiance, to_map_frame
+from fastgen.scene import Color, Ground
 from fastgen.scene.boxes import OrientedBox
 from fastgen.scene.limits import MM
 
@@ -31,6 +32,9 @@ _MARGIN_M = (4.0, 14.0)
 
 _OUTSIDE_M = 2e-3
 """Distance from a face at which light next to it is computed."""
+
+LINE_MM = 130.0
+"""Width of the lines painted on the ground."""
 
 _SECTORS = 16
 """Azimuths in which the overlap of boxes is computed."""
@@ -62,6 +66,31 @@ class GroundLight:
             self.texels, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
         )
         return np.asarray(found, np.float32).reshape(-1, 4)
+
+
+def mean_albedo(ground: Ground) -> Color:
+    """Return the albedo of a dry ground with its lines, as seen from afar."""
+    share = ground.lines * LINE_MM / ground.line_spacing_mm
+    pairs = zip(ground.albedo, ground.line_albedo, strict=True)
+    red, green, blue = (own + share * (line - own) for own, line in pairs)
+    return red, green, blue
+
+
+def left_of_sky(whole: ArrayLike, left: ArrayLike, share: ArrayLike) -> NDArray[np.floating]:
+    """Return light of which something hides a part, by two estimates; all shapes broadcast.
+
+    The radiance of what is hidden is known only roughly, so the less is left, the less it may
+    differ from the same share of the whole.
+
+    Args:
+        whole: All light.
+        left: The light less what is estimated to be hidden of it.
+        share: Share of an even light that is left.
+    """
+    even = np.asarray(whole) * share
+    most = 1 + np.asarray(share)
+    found: NDArray[np.floating] = np.clip(left, even / most, even * most)
+    return found
 
 
 def form_factors(corners: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -137,11 +166,13 @@ def ground_light(
         .astype(np.float32)
     )
     hidden, bounced = _occlusion(placed, points, radiance)
-    bent = -hidden
-    bent[2] += 1.0
-    share = np.maximum(bent[2], 0.0)
-    normals = (bent / np.maximum(np.sqrt((bent * bent).sum(axis=0)), 1e-6)).T
-    sky = sky_irradiance(ambient, normals, yaw_deg).T * share
+    share = np.maximum(1.0 - hidden[:, 2].sum(axis=0), 0.0)
+    (whole,) = sky_irradiance(ambient, [[0.0, 0.0, 1.0]], yaw_deg)
+    sky = np.repeat(whole[:, None], points.shape[1], axis=1)
+    for each in hidden:
+        some = np.flatnonzero(each[2])
+        sky[:, some] -= each[2, some] * hidden_sky(ambient, each[:, some].T, yaw_deg).T
+    sky = left_of_sky(whole[:, None], sky, share)
     # walls of narrow gaps are in the shade themselves
     light = sky + bounced * np.minimum(2 * share, 1.0)
     texels = np.concatenate([light, share[None]]).T.reshape(*GRID[::-1], 4)
@@ -228,16 +259,16 @@ class _Placed:
 def _occlusion(
     boxes: Sequence[_Placed], points: NDArray[np.float32], radiance: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the vector form factor of all boxes and the light off them, [3, P] each.
+    """Return the vector form factor [B, 3, P] of each box and the light [3, P] off all of them.
 
     The underside of a box returns next to nothing.
     """
-    hidden = np.zeros((3, points.shape[1]), np.float32)
-    bounced = np.zeros_like(hidden)
+    hidden = np.zeros((len(boxes), 3, points.shape[1]), np.float32)
+    bounced = np.zeros((3, points.shape[1]), np.float32)
     shares = _visible_shares(boxes, points)
-    for box, seen, sides in zip(boxes, shares, radiance, strict=True):
+    for each, box, seen, sides in zip(hidden, boxes, shares, radiance, strict=True):
         at = box.local(points)
-        total = np.zeros_like(hidden)
+        total = np.zeros_like(bounced)
         for axis in (0, 1):
             factor = box.sides(at, axis) * seen
             total += factor
@@ -245,7 +276,7 @@ def _occlusion(
             bounced += factor[2] * np.where(at[axis] < 0, low[:, None], high[:, None])
         if box.bottom >= LOW_GAP_M:
             total += box.underside(at) * seen
-        hidden += box.to_world(total)
+        each[:] = box.to_world(total)
     return hidden, bounced
 
 

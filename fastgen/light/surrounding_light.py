@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from fastgen.geometry.mesh import Mesh
 from fastgen.light.environment import (
     Ambient,
+    hidden_sky,
     lower_irradiance,
     sky_irradiance,
     to_map_frame,
 )
-from fastgen.light.ground_light import form_factors
+from fastgen.light.ground_light import form_factors, left_of_sky
 from fastgen.light.sky_visibility import Sky, sky_directions
 from fastgen.scene.boxes import OrientedBox
 
@@ -57,10 +58,13 @@ class SurroundingLight:
         factor: float32 [P, 3], factor on the light without directional lights at each point.
         open_bits: uint8 [P, DIRECTIONS / 8], directions of the container's frame that no other
             container hides, packed by np.packbits.
+        ground: float32 [6, 3], mean radiance of the ground in a level mirror on the -x, +x, -y, +y,
+            -z and +z side of the container; None without ground.
     """
 
     factor: NDArray[np.float32]
     open_bits: NDArray[np.uint8]
+    ground: NDArray[np.float32] | None
 
     def applied(self, values: NDArray[np.uint8], mesh: Mesh) -> NDArray[np.uint8]:
         """Return vertex bytes in these surroundings.
@@ -160,7 +164,7 @@ def surrounding_light(
         _face_radiance(i, faces, boxes, light, yaw_deg) * np.array(albedo)
         for i, albedo in enumerate(albedos)
     ]
-    found = []
+    found, sky = [], Sky(light, yaw_deg)
     for i, box in enumerate(boxes):
         low, high = (np.asarray(bound, np.float64) for bound in bounds[i])
         local, normals = _lattice((high - low) / 2)
@@ -175,20 +179,22 @@ def surrounding_light(
             np.zeros((len(points), 3)),
         )
         whole = np.maximum(sky_irradiance(light, toward, yaw_deg), 1e-9)
+        seen = None
         if paving is None:
             factor = 1 - hidden[:, None] + bounced / whole
         else:
-            share, ground = _from_ground(
-                points, toward, i, boxes, faces, Sky(light, yaw_deg), paving
-            )
+            share, ground, seen = _from_ground(points, toward, i, boxes, faces, sky, paving)
             lower = (1 - toward[:, 2]) / 2
             # boxes cover what is below the horizon and not ground
-            open_ = 1 - (hidden - (lower - share)) / np.maximum(1 - lower, 1e-6)
-            upper = whole - _lower_by_face(light, box, normals, yaw_deg)
-            above = np.clip(open_, 0.0, 1.0)[:, None] * np.maximum(upper, 0.0)
+            taken = np.maximum(hidden - (lower - share), 0.0)
+            open_ = np.clip(1 - taken / np.maximum(1 - lower, 1e-6), 0.0, 1.0)
+            upper = np.maximum(whole - _lower_by_face(light, box, normals, yaw_deg), 0.0)
+            behind = _sky_behind(points, covered, [faces[j] for j in others], sky)
+            above = left_of_sky(upper, upper - taken[:, None] * behind, open_[:, None])
             factor = (above + ground + bounced) / whole
+            seen = _mean_by_side(seen, normals)
         bits = _open_bits(points, box, [boxes[j] for j in others])
-        found.append(SurroundingLight(np.maximum(factor, 0.02).astype(np.float32), bits))
+        found.append(SurroundingLight(np.maximum(factor, 0.02).astype(np.float32), bits, seen))
     return found
 
 
@@ -219,12 +225,24 @@ def _covered(points: Array, toward: Array, faces: Sequence[_Faces]) -> Array:
     """Return the form factors [B, 6, P] of the faces of boxes at points with normals [P, 3]."""
     found = np.zeros((len(faces), 6, len(points)))
     for factor, each in zip(found, faces, strict=True):
-        apart = each.corners[:, :, None] - points  # [6, 4, P, 3]
-        vectors = form_factors(apart.transpose(3, 1, 0, 2).reshape(3, 4, -1)).reshape(3, 6, -1)
-        factor[:] = np.maximum(np.einsum("cfp,pc->fp", vectors, toward), 0.0)
-        factor[((points - each.middles[:, None]) * each.normals[:, None]).sum(axis=-1) <= 0] = 0.0
+        height = points @ each.normals.T - (each.middles * each.normals).sum(axis=1)
+        at, side = np.nonzero(height > 0)  # before a face
+        vectors = form_factors((each.corners[side] - points[at, None]).transpose(2, 1, 0))
+        factor[side, at] = np.maximum((vectors * toward[at].T).sum(axis=0), 0.0)
     found *= np.minimum(1.0, _MOST_HIDDEN / np.maximum(found.sum(axis=(0, 1)), 1e-9))
     return found
+
+
+def _sky_behind(points: Array, covered: Array, faces: Sequence[_Faces], sky: Sky) -> Array:
+    """Return the mean radiance [P, 3] of the sky that boxes hide, by form factors [B, 6, P]."""
+    box, side, at = np.nonzero(covered)
+    if not len(at):
+        return np.zeros((len(points), 3))
+    middles = np.array([each.middles for each in faces])
+    behind = hidden_sky(sky.light, middles[box, side] - points[at], sky.yaw_deg)
+    factor = covered[box, side, at]
+    sums = [np.bincount(at, factor * part, len(points)) for part in behind.T]
+    return np.stack(sums, axis=1) / np.maximum(covered.sum(axis=(0, 1)), 1e-9)[:, None]
 
 
 def _face_radiance(
@@ -272,12 +290,14 @@ def _from_ground(
     faces: Sequence[_Faces],
     sky: Sky,
     paving: Paving,
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Return the share [P] of the hemispheres in which box `number` sees ground, and its light.
 
     The light is irradiance / pi [P, 3]. A wall at height h sees the share 1 - h / sqrt(h^2 + d^2)
     of all level ground within the distance d. Rays straight ahead to the quantiles of this share
-    have equal weights.
+    have equal weights. The third value [P, 4] is the sum of radiances, and of their weights, in the
+    lobe of a level mirror: GGX lobes of roughness 0.5 to 0.7 weigh the quantiles about as their
+    values.
     """
     light, yaw_deg = sky.light, sky.yaw_deg
     up = np.array([0.0, 0.0, 1.0])
@@ -294,20 +314,33 @@ def _from_ground(
         if other != number:
             seen = seen & ~box.between(points, ends)
     share, found = np.zeros(len(points)), np.zeros((len(points), 3))
-    for reached, shown in zip(away, seen, strict=True):
+    mirrored = np.zeros((len(points), 4))
+    for near, reached, shown in zip(quantile.mean(axis=(1, 2)), away, seen, strict=True):
         part = shown.mean(axis=0)
         some = np.flatnonzero(part)
         middle = (reached * shown).sum(axis=0)[some] / shown.sum(axis=0)[some]
         at = points[some] + middle[:, None] * level[some]
         at[:, 2] = paving.height_mm + _LIFT_MM
         normals = np.broadcast_to(up, at.shape)
-        hidden = _covered(at, normals, faces).sum(axis=(0, 1))
-        lit = sky_irradiance(light, normals, yaw_deg) * (1 - hidden[:, None])
+        covered = _covered(at, normals, faces)
+        hidden = covered.sum(axis=(0, 1))
+        whole = sky_irradiance(light, normals, yaw_deg)
+        left = whole - hidden[:, None] * _sky_behind(at, covered, faces, sky)
+        lit = left_of_sky(whole, left, 1 - hidden[:, None])
         lit = lit + _from_lights(at, normals, boxes, light, yaw_deg)
         weight = part[some] * lower[some] / _GROUND_POINTS
         share[some] += weight
         found[some] += weight[:, None] * lit
-    return share, found * np.array(paving.albedo)
+        mirrored[some] += near * weight[:, None] * np.insert(lit, 3, 1.0, axis=1)
+    mirrored[:, :3] *= paving.albedo
+    return share, found * np.array(paving.albedo), mirrored
+
+
+def _mean_by_side(weighted: Array, normals: Array) -> NDArray[np.float32]:
+    """Return the mean radiance [6, 3] on each side of sums and weights [P, 4]."""
+    sides = np.stack([normals[:, axis] * sign > 0.5 for axis, sign in _FACES]).astype(float)
+    found = sides @ weighted
+    return np.asarray(found[:, :3] / np.maximum(found[:, 3:], 1e-6), np.float32)
 
 
 def _open_bits(points: Array, box: OrientedBox, others: Sequence[OrientedBox]) -> NDArray[np.uint8]:

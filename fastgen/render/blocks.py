@@ -43,6 +43,8 @@ SCENE_BLOCK = Block(
         ("int", "decal_layers"),  # see DecalTables
         ("float", "decal_cell_mm"),
         ("float", "decal_margin_mm"),
+        # radiance of the ground before the -x, +x, -y, +y, -z and +z side; 1 if there is one
+        ("vec4", "ground_seen", 6),
         ("vec4", "above"),  # albedo of the spreader above the container; 1 if there is one
     ),
 )

@@ -18,6 +18,7 @@ from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
 from fastgen.geometry.sheet_folds import CORRUGATED_ALONG_Y
 from fastgen.light import environment
+from fastgen.light.ground_light import LINE_MM
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX
 from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
 from fastgen.render import glyph_runs, rust
@@ -212,6 +213,7 @@ def _ground(v: ShaderVariant) -> Defines:
         "GROUND_COARSE": int(ground.coarse),
         "EACH_BOX(f)": _each("f", ground.boxes),
         "GROUND_FADE_START": GROUND_FADE_START,
+        "LINE_MM": LINE_MM,
         "MAX_BOXES": MAX_BOXES,
         "TILE_PX": TILE_PX,
     }

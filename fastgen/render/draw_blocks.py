@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 
 import moderngl
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
@@ -33,10 +34,14 @@ class DrawBlocks:
             buffer.bind_to_uniform_block(block.binding)
 
     def scene(
-        self, prepared: PreparedScene, decals: DecalTextures, background_size: int = 0
+        self,
+        prepared: PreparedScene,
+        decals: DecalTextures,
+        background_size: int = 0,
+        ground: NDArray[np.float32] | None = None,
     ) -> None:
         """Fill the block of the scene; the arguments are those of `scene_values`."""
-        values = {**scene_values(prepared, background_size), **decals.values}
+        values = {**scene_values(prepared, background_size, ground), **decals.values}
         self._fill(SCENE_BLOCK, values)
 
     def damages(

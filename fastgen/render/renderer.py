@@ -236,7 +236,8 @@ class Renderer:
         )
         seals = self._shapes.seals(prepared, lit[0])
         decals = resources.decals(scale_for(prepared.container, view))
-        self._blocks.scene(prepared, decals, len(light.background))
+        ground = None if near is None else near.ground
+        self._blocks.scene(prepared, decals, len(light.background), ground)
         if damage != "undamaged":
             self._blocks.damages(prepared, damages, self._kinds, samples.inner_row)
         return DrawInputs(

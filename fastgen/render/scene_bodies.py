@@ -10,7 +10,7 @@ from fastgen.geometry.damage_law import deform
 from fastgen.geometry.prepared_scene import Member
 from fastgen.geometry.unit_solids import unit_solid
 from fastgen.light.environment import Ambient, sky_irradiance, to_map_frame
-from fastgen.light.ground_light import GroundLight
+from fastgen.light.ground_light import GroundLight, mean_albedo
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
 from fastgen.light.surrounding_light import SurroundingLight
 from fastgen.render.sky_visibility_probe import LitMesh
@@ -117,7 +117,7 @@ def _of_ground(ground: Ground, light: GroundLight) -> LitBody:
     return LitBody(
         place.reshape(-1, 3).astype(np.float32),
         triangles,
-        np.broadcast_to(np.array(ground.albedo, np.float32), (rows * columns, 3)),
+        np.broadcast_to(np.array(mean_albedo(ground), np.float32), (rows * columns, 3)),
         light.texels[..., :3].reshape(-1, 3),
     )
 

@@ -9,6 +9,7 @@ from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.exposure import metered_exposure
+from fastgen.light.ground_light import mean_albedo
 from fastgen.light.lamps import unit_luminance, with_lamps
 from fastgen.light.surrounding_light import Paving, SurroundingLight, surrounding_light
 from fastgen.render.environment_textures import BackgroundTextures, GpuLight
@@ -90,7 +91,7 @@ class SceneLights:
                 [each.prepared.container.bounds_mm for each in members],
                 self.ambient(scene.environment),
                 scene.environment.yaw_deg,
-                Paving(ground.height_mm, ground.albedo) if ground else None,
+                Paving(ground.height_mm, mean_albedo(ground)) if ground else None,
             )
             return {each.prepared: one for each, one in zip(members, changes, strict=True)}
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fastgen.geometry.damage_law import reach_mm
 from fastgen.geometry.mesh import MATERIALS
@@ -90,12 +90,15 @@ class SceneMaterials:
         return self.reflectances[MATERIALS.index("paint_sheet")]
 
 
-def scene_values(prepared: PreparedScene, background_size: int) -> Mapping[str, ArrayLike]:
+def scene_values(
+    prepared: PreparedScene, background_size: int, ground: NDArray[np.float32] | None = None
+) -> Mapping[str, ArrayLike]:
     """Return the members of SCENE_BLOCK.
 
     Args:
         prepared: The scene.
         background_size: Side of the background map in texels, 0 without one.
+        ground: Radiance of the ground that each side sees, see SurroundingLight; None without one.
     """
     scene = prepared.scene
     surface = scene.surface
@@ -126,6 +129,7 @@ def scene_values(prepared: PreparedScene, background_size: int) -> Mapping[str, 
         "container_id": prepared.numbers.container,
         "first_seal_id": prepared.numbers.first_seal,
         "undamaged_value": prepared.numbers.undamaged,
+        "ground_seen": np.zeros((6, 4)) if ground is None else np.insert(ground, 3, 1.0, axis=1),
         "above": (*scene.spreader.albedo, float(scene.spreader.present)),
     }
 

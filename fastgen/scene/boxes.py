@@ -66,7 +66,14 @@ class OrientedBox:
         way = way_mm @ self.rotation
         way = np.where(np.abs(way) < 1e-9, 1e-9, way)
         middle, reach = -start / way, self.half_mm / np.abs(way)
-        return (middle - reach).max(axis=-1), (middle + reach).min(axis=-1)
+        # a reduction over an axis of three takes several times as long
+        x, y, z = np.moveaxis(middle - reach, -1, 0)
+        far_x, far_y, far_z = np.moveaxis(middle + reach, -1, 0)
+        enters, leaves = (
+            np.maximum(np.maximum(x, y), z),
+            np.minimum(np.minimum(far_x, far_y), far_z),
+        )
+        return enters, leaves
 
     def between(self, start_mm: Array, end_mm: Array) -> NDArray[np.bool_]:
         """Return whether the box is on the straight way between points [..., 3]."""
