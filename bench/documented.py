@@ -91,8 +91,8 @@ def readme_lines() -> list[str]:
         {version_sentence()}""",
         f"""- **Accuracy.** `balanced` is as close to a path-traced reference as Cycles with
         {equal.words} samples per pixel ([accuracy](docs/accuracy.md), version
-        {stored("pareto")["fastgen"]}), at 1/{ratio:.0f} of its CPU time on the machine of the
-        benchmarks ([other machines](docs/benchmarks.md#distance-to-the-path-tracer)).""",
+        {stored("pareto")["fastgen"]}), at 1/{ratio:.0f} of its CPU time on a busy machine
+        ([about twice that](docs/benchmarks.md#distance-to-the-path-tracer) on a faster one).""",
         f"""- **Labels.** {label_sentence()} [docs/stability.md](docs/stability.md) lists conditions
         in which renderers and labels fail, with tests.""",
     )
