@@ -1,7 +1,7 @@
 """Measure the time and the pixels of each render pass.
 
     python bench/passes.py [--scenes 6] [--repeats 3] [--size 640x640] [--damage 0.4]
-        [--quality balanced]
+        [--quality balanced] [--preset gate]
 
 Prints CPU ms and thousands of pixels of each pass by camera, measured in one process. Each time is
 the fastest of `repeats` draws, averaged over the scenes. CPU time of the process is hardly affected
@@ -31,6 +31,7 @@ from fastgen import Config, Generator
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.passes.background import BackgroundPass
+from fastgen.render.passes.ground import GroundPass
 from fastgen.render.passes.shading import ShadingPass
 from fastgen.render.pixel_lists import PixelLists
 from fastgen.render.settings import QUALITY
@@ -59,6 +60,7 @@ class PassTimer:
             GpuMesh, "draw", lambda program, _: "inside" if program == "holed" else "geometry"
         )
         self._wrap(BackgroundPass, "run", lambda *_: "background")
+        self._wrap(GroundPass, "run", lambda *_: "ground")
         self._wrap(ShadingPass, "_classify", lambda *_: "classify")
         self._wrap(PixelLists, "dispatch", lambda name, *_: name)
         return self
@@ -149,12 +151,13 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--size", default="640x640")
     parser.add_argument("--quality", choices=tuple(QUALITY), default="balanced")
+    parser.add_argument("--preset", default="seafront")
     parser.add_argument("--damage", type=float, help="share of scenes with damage")
     options = parser.parse_args()
     width, height = parse_size(options.size)
     values = {} if options.damage is None else {"damage": {"probability": options.damage}}
     times, pixels = measure(
-        Config.from_values(values),
+        Config.from_values(values, Config.preset(options.preset)),
         (width, height),
         options.quality,
         options.scenes,

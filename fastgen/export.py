@@ -32,7 +32,7 @@ from fastgen.geometry.damage_law import variant
 from fastgen.geometry.damaged_mesh import DamagedMesh, damaged_mesh
 from fastgen.geometry.mesh import MATERIALS, Mesh
 from fastgen.geometry.prepared_scene import Member, PreparedScene
-from fastgen.geometry.unit_solids import unit_box, unit_cylinder
+from fastgen.geometry.unit_solids import unit_solid
 from fastgen.render.constants import GROUND_FADE_START, INSIDE_ALBEDO
 from fastgen.render.passes.bake import Atlas, atlas_size, least_texel_mm
 from fastgen.render.surface_values import SEAL_STEEL_ALBEDO
@@ -260,7 +260,7 @@ def _seals(mesh: Mesh, number: int) -> dict[str, trimesh.Trimesh]:
 
 def _prop(prop: Prop, name: str) -> trimesh.Trimesh:
     """Return a prop in its own frame."""
-    solid = unit_box() if prop.shape == "box" else unit_cylinder()
+    solid = unit_solid(prop.shape)
     half_mm = np.array(prop.size_mm) / 2
     plain = PBRMaterial(name, metallicFactor=0.0, roughnessFactor=float(prop.roughness))
     visual = TextureVisuals(material=plain)

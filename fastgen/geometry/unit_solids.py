@@ -18,7 +18,12 @@ class UnitSolid(NamedTuple):
     triangles: NDArray[np.integer]
 
 
-def unit_box() -> UnitSolid:
+def unit_solid(shape: str) -> UnitSolid:
+    """Return a 'box' with flat faces, or a 'cylinder' along y with a smooth side."""
+    return _box() if shape == "box" else _cylinder()
+
+
+def _box() -> UnitSolid:
     """Return a box with flat faces."""
     corners, normals = [], []
     for axis, sign in itertools.product(range(3), (-1, 1)):
@@ -31,7 +36,7 @@ def unit_box() -> UnitSolid:
     return UnitSolid(np.array(corners), np.array(normals), triangles)
 
 
-def unit_cylinder() -> UnitSolid:
+def _cylinder() -> UnitSolid:
     """Return a cylinder along y with a smooth side."""
     angle = np.linspace(0, 2 * np.pi, ROUND_SIDES, endpoint=False)
     out = np.stack([np.cos(angle), np.zeros(ROUND_SIDES), -np.sin(angle)], axis=-1)

@@ -8,6 +8,7 @@ Radiosity Solutions Through the Use of Analytically Determined Form-Factors, eq.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -53,6 +54,14 @@ class GroundLight:
     low_m: Array
     step_m: Array
     face_radiance: NDArray[np.float32]
+
+    def at(self, place_m: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Return the texels [K, 4] at world places [K, 2], interpolated; the border goes on."""
+        column, row = np.asarray((place_m - self.low_m) / self.step_m, np.float32).T
+        found = cv2.remap(
+            self.texels, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+        return np.asarray(found, np.float32).reshape(-1, 4)
 
 
 def form_factors(corners: NDArray[np.floating]) -> NDArray[np.floating]:

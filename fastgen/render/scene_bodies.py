@@ -1,4 +1,4 @@
-"""Bodies of a scene that rays can hit: containers, the spreader and the ground, in their light."""
+"""Bodies of a scene that rays can hit: containers, spreader, ground and props, in their light."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -8,14 +8,21 @@ from numpy.typing import NDArray
 
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.prepared_scene import Member
-from fastgen.light.environment import Ambient, to_map_frame
+from fastgen.geometry.unit_solids import unit_solid
+from fastgen.light.environment import Ambient, sky_irradiance, to_map_frame
 from fastgen.light.ground_light import GroundLight
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
 from fastgen.light.surrounding_light import SurroundingLight
 from fastgen.render.sky_visibility_probe import LitMesh
-from fastgen.scene import Ground, Scene
+from fastgen.scene import Ground, Prop, Scene
 from fastgen.scene.boxes import rotation_of
 from fastgen.scene.limits import MM
+
+_BESIDE_M = 0.3
+"""Distance before the face of a prop at which the ground stands for what is around the face."""
+
+_LOWEST, _OPEN_M = 0.55, 0.4
+"""Share of its light that a prop has at the ground, and height above which it has all of it."""
 
 
 class LitMember(NamedTuple):
@@ -44,7 +51,7 @@ def scene_bodies(
     """Return what rays can hit, in the world frame.
 
     Containers are damaged but have no holes, and carry the light of undamaged ones. The ground has
-    one colour, and no props.
+    one colour.
 
     Args:
         members: The containers that the scene shows.
@@ -56,6 +63,8 @@ def scene_bodies(
     bodies = [body for each in members for body in _of_member(each, lens)]
     if scene.ground is not None and ground is not None:
         bodies.append(_of_ground(scene.ground, ground))
+        yaw_deg = scene.environment.yaw_deg
+        bodies += [_of_prop(each, scene.ground, ground, ambient, yaw_deg) for each in scene.props]
     suns = [
         DistantLight(
             to_map_frame(sun.direction, -scene.environment.yaw_deg).astype(np.float32),
@@ -110,4 +119,28 @@ def _of_ground(ground: Ground, light: GroundLight) -> LitBody:
         triangles,
         np.broadcast_to(np.array(ground.albedo, np.float32), (rows * columns, 3)),
         light.texels[..., :3].reshape(-1, 3),
+    )
+
+
+def _of_prop(
+    prop: Prop, ground: Ground, light: GroundLight, ambient: Ambient, yaw_deg: float
+) -> LitBody:
+    """Return a prop in the light of the sky and the ground around it.
+
+    The numpy twin of prop_color() in shaders/ground_props.glsl, without directional lights.
+    """
+    solid, turn = unit_solid(prop.shape), rotation_of(prop.pose)
+    corners = solid.corners * np.array(prop.size_mm) / 2
+    place = corners @ turn.T + np.array(prop.pose.position_mm)
+    normals = solid.normals @ turn.T
+    around = light.at(place[:, :2] * MM + _BESIDE_M * normals[:, :2])
+    up = 0.5 + 0.5 * normals[:, 2:]
+    sky = sky_irradiance(ambient, normals + (0.0, 0.0, 0.5), yaw_deg)
+    found = up * around[:, 3:] * sky + (1 - up) * np.array(ground.albedo) * around[:, :3]
+    raised = np.clip((place[:, 2:] - ground.height_mm) * MM / _OPEN_M, 0.0, 1.0)
+    return LitBody(
+        place.astype(np.float32),
+        solid.triangles.astype(np.uint32),
+        np.broadcast_to(np.array(prop.albedo, np.float32), place.shape),
+        (found * (_LOWEST + (1 - _LOWEST) * raised)).astype(np.float32),
     )
