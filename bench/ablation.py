@@ -35,7 +35,7 @@ from ablation_elements import ELEMENTS, Element, gpu_session
 from image_error import displayed, flip
 from numpy.typing import NDArray
 from reference_set import FILTERS, SIZE, Case, Reference, load, traced
-from reporting import machine, origin, parse_size, save, write_section
+from reporting import heading, origin, parse_size, save, write_section
 
 from fastgen.frame import Frame
 from fastgen.geometry.prepared_scene import PreparedScene
@@ -193,9 +193,8 @@ def main() -> None:
     options = parser.parse_args()
     size = parse_size(options.size)
     chosen = traced(options.cases)
-    about = machine()
     lines = [
-        f"{len(chosen)} cases, draws at {options.size}, {QUALITY}, {about}, no GPU.",
+        f"{len(chosen)} cases, draws at {options.size}, {QUALITY}, {heading()}.",
         "",
         "| without | FLIP of objects, mean (worst case) | visible change | farther from Cycles "
         "| CPU ms saved |",

@@ -13,7 +13,7 @@ the pixels of the ground and the props on it.
 
 Two figures put the errors in perspective. Cycles' own noise is the same measure between two of its
 renders with different seeds. For each quality, the table also shows at how many samples Cycles has
-the same error, and the CPU time it needs for them.
+the same error. pareto.py measures times.
 
 Works without Blender; `--blender-python PYTHON` traces missing references (see
 trace_references.py). Writes tables to docs/accuracy.md, bench/results/accuracy.json,
@@ -25,7 +25,6 @@ import argparse
 import os
 import subprocess
 import sys
-import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -40,14 +39,13 @@ from error_pictures import contact_picture, picture, write_picture
 from image_error import Comparison, displayed, divided, stops_over
 from numpy.typing import NDArray
 from reference_set import DEPTH_STEP, FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
-from reporting import ROOT, machine, origin, save, write_section
+from reporting import ROOT, heading, origin, save, write_section
 from surrounded_cases import SurroundedCase, every_case, surrounded_cases
 
 from fastgen import Config, Generator
 from fastgen.sample import Sample
 
 MIN_COINCIDENCE = 0.999
-REPEATS = 3
 CONTACT_CASES = 8
 
 Array = NDArray[np.floating]
@@ -70,7 +68,6 @@ class Result:
         ground: Mean FLIP over the pixels of ground and props; nan if there are none.
         parts: By part of the image: number of pixels, sum of their FLIP, and median stops by which
             our image is brighter.
-        seconds: CPU time of a labelled image.
         panels: Our image, the reference, and the FLIP map.
     """
 
@@ -79,7 +76,6 @@ class Result:
     rounding: tuple[float, ...]
     ground: float
     parts: dict[str, tuple[int, float, float]]
-    seconds: float
     panels: tuple[Array, Array, Array]
 
 
@@ -110,7 +106,7 @@ def check_geometry(case: Case, reference: Reference, sample: Sample) -> tuple[fl
 def compared(
     generator: Generator, case: Case, reference: Reference, filter_name: str, sample: Sample
 ) -> Result:
-    """Measure `sample` against the reference, and time repeated renders of the same view."""
+    """Measure `sample` against the reference."""
     scene, camera = reference.scene, reference.scene.camera(case.camera)
     exposure = generator.exposure(scene, camera)
     expected = displayed(reference.radiance[filter_name], exposure)
@@ -125,16 +121,11 @@ def compared(
         )
         for part, mask in divided(sample, reference.openness).items()
     }
-    spent = []
-    for _ in range(REPEATS):
-        began = time.process_time()
-        generator.render(scene=scene, camera=camera)
-        spent.append(time.process_time() - began)
     measures, rounding = (c.both(reference.inside) for c in (error, rounded))
     panels = (ours, expected, error.flip_map)
     plane = (sample.ids == 0) & np.isfinite(sample.depth)
     ground = float(error.flip_map[plane].mean()) if plane.any() else float("nan")
-    return Result(case, measures, rounding, ground, parts, min(spent), panels)
+    return Result(case, measures, rounding, ground, parts, panels)
 
 
 def all_results(quality: str, chosen: Iterable[Case]) -> tuple[list[Result], str]:
@@ -149,7 +140,8 @@ def all_results(quality: str, chosen: Iterable[Case]) -> tuple[list[Result], str
             apart.append(apart_mm)
             found.append(compared(generator, case, reference, FILTERS[quality], sample))
     coincidence = (
-        f"{quality}: silhouettes agree in {np.mean(same):.4%} of pixels (worst case "
+        f"{quality}, {len(same)} cases, those with a ground included: silhouettes agree in "
+        f"{np.mean(same):.4%} of pixels (worst case "
         f"{min(same):.3%}), 99 % of depths within {np.median(apart):.2f} mm "
         f"(worst case {max(apart):.2f})"
     )
@@ -243,32 +235,31 @@ def as_samples(results: dict[str, list[Result]], figures: Figures) -> list[str]:
 
     Covers the cases that have a Cycles series.
     """
-    columns = ["quality", "pixels", "FLIP", "CPU ms"]
-    columns += ["Cycles with the same FLIP", "takes", "denoised Cycles", "takes"]
-    lines = ["| " + " | ".join(columns) + " |", "| --- |" + " --- |" * 7]
+    columns = ["quality", "pixels", "FLIP", "Cycles with the same FLIP", "denoised Cycles"]
+    lines = ["| " + " | ".join(columns) + " |", "| --- |" + " --- |" * 4]
     for quality, listed in results.items():
-        timed = [r for r in listed if r.case.number in figures.series]
-        numbers = [r.case.number for r in timed]
-        seconds = float(np.mean([r.seconds for r in timed]))
+        traced = [r for r in listed if r.case.number in figures.series]
+        numbers = [r.case.number for r in traced]
         for where, column in (("whole image", 0), ("objects", 3)):
-            error = float(np.mean([r.measures[column] for r in timed]))
-            cells = [quality, where, f"{error:.3f}", f"{seconds * 1e3:.0f}"]
+            error = float(np.mean([r.measures[column] for r in traced]))
+            cells = [quality, where, f"{error:.3f}"]
             for way in ("spp", "denoised"):
                 equal = equal_samples(figures.curve(numbers, way, column), error)
-                cells += [f"{equal.words} samples", f"{equal.seconds / seconds:.0f} times as long"]
+                cells.append(f"{equal.words} samples")
             lines.append("| " + " | ".join(cells) + " |")
     return lines
-
-
-def heading(count: int) -> str:
-    """Return a line that says what was measured on which machine."""
-    return f"{count} cases, {SIZE[0]}x{SIZE[1]}, {machine()}, no GPU."
 
 
 def main_section(results: dict[str, list[Result]], coincidence: list[str]) -> list[str]:
     """Return the tables about the cases without surroundings."""
     figures = Figures.load()
-    lines = [heading(len(next(iter(results.values())))), "", *overall(results, figures), ""]
+    count = len(next(iter(results.values())))
+    lines = [
+        f"{count} cases, {SIZE[0]}x{SIZE[1]}, {heading()}.",
+        "",
+        *overall(results, figures),
+        "",
+    ]
     lines += [*(f"- {line}" for line in coincidence), ""]
     if any(r.case.number in figures.series for r in next(iter(results.values()))):
         lines += [f"Over the {len(figures.series)} cases with a Cycles series:", ""]
@@ -282,7 +273,8 @@ def main_section(results: dict[str, list[Result]], coincidence: list[str]) -> li
 
 def surroundings_section(results: dict[str, list[Result]]) -> list[str]:
     """Return the tables about the cases with ground and neighbours."""
-    lines = [heading(len(next(iter(results.values())))), "", *by_surroundings(results), ""]
+    count = len(next(iter(results.values())))
+    lines = [f"{count} cases, {SIZE[0]}x{SIZE[1]}, {heading()}.", "", *by_surroundings(results), ""]
     quality = "balanced" if "balanced" in results else next(iter(results))
     return [*lines, *by_part(quality, results[quality])]
 
@@ -349,7 +341,7 @@ def main() -> None:
     for name, lines in sections.items():
         write_section(name, lines)
     measures = {
-        quality: {f"{r.case.number:02d}": [*r.measures, r.seconds, r.ground] for r in listed}
+        quality: {f"{r.case.number:02d}": [*r.measures, r.ground] for r in listed}
         for quality, listed in results.items()
     }
     save("accuracy", {**origin(), "measures": measures})

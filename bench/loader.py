@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import simplejpeg
 import torch
-from reporting import ROOT, machine, origin, parse_size, save, write_section
+from reporting import ROOT, heading, origin, parse_size, save, write_section
 from torch import nn
 from torch.utils.data import DataLoader, Dataset
 from transformers import ResNetConfig, ResNetForImageClassification
@@ -147,7 +147,7 @@ def run(net: str, source: str, data: Dataset[Any], workers: int, batch: int) -> 
 def table(rows: list[Row], options: argparse.Namespace) -> list[str]:
     """Return the rows as a Markdown table."""
     return [
-        f"{machine()}, no GPU; {options.size}, batch {options.batch}, {options.steps} steps.",
+        f"{heading()}; {options.size}, batch {options.batch}, {options.steps} steps.",
         "",
         "| network | images are | workers | waiting | ms per step | images/s |",
         "| --- | --- | --- | --- | --- | --- |",

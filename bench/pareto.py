@@ -45,7 +45,7 @@ from image_error import displayed, flip, srgb_decode, srgb_encode
 from pareto_chart import Point, draw, front
 from peer_jobs import shot
 from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
-from reporting import origin, save, write_section
+from reporting import heading, origin, save, write_section
 
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
@@ -287,7 +287,7 @@ def main() -> None:
     best = front(points)
     figures = {**origin(), "cases": len(chosen), "size": f"{SIZE[0]}x{SIZE[1]}"}
     lines = [
-        f"{figures['cases']} cases, {figures['size']}, {figures['machine']}, no GPU.",
+        f"{figures['cases']} cases, {figures['size']}, {heading()}.",
         "",
         "| renderer | setting | images/s per core | FLIP of objects | on the Pareto front |",
         "| --- | --- | --- | --- | --- |",

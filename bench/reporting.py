@@ -29,6 +29,11 @@ def machine() -> str:
     return f"{model}, {len(os.sched_getaffinity(0))} cores"
 
 
+def heading() -> str:
+    """Return the machine and the version, for the line above a table of figures without a GPU."""
+    return f"{machine()}, no GPU, version {fastgen.__version__}"
+
+
 def parse_size(text: str) -> tuple[int, int]:
     """Parse a size such as 640x480 into (width, height).
 

@@ -51,7 +51,8 @@ ALL_DAMAGE_CLASSES = tuple(dict.fromkeys((*BUNDLED_DAMAGE_CLASSES, *PACKAGE_DAMA
 paper's unless `damage.kinds` lists others."""
 
 SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
-"""The five classes of the damage task, in the order of YOLO labels."""
+"""The SeaFront paper's classes of the damage task, which every dataset has first in YOLO labels.
+`segmentation_classes` adds the kinds of damage that a configuration lists besides."""
 
 ALL_SEGMENTATION_CLASSES = ("container", *ALL_DAMAGE_CLASSES)
 """COCO category i + 1 is ALL_SEGMENTATION_CLASSES[i]; mask value is category * 100 + instance. The

@@ -16,7 +16,8 @@ def section(name):
 def test_pages_have_the_figures_of_the_latest_results():
     fix = "run python bench/documented.py"
     assert section("speed accuracy labels") == "\n".join(documented.readme_lines()), fix
-    assert section("labels") == "\n".join(documented.benchmark_lines()), fix
+    assert section("labels") == "\n".join(documented.label_lines()), fix
+    assert section("times") == "\n".join(documented.time_lines()), fix
 
 
 def test_cpu_time_in_the_introduction_is_that_of_draft_and_balanced():
