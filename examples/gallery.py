@@ -159,6 +159,9 @@ SECTIONS = {
             _damage("rust_through: pits and holes", "rust_through", 3),
             _damage("missing_paint: flaked off", "missing_paint", 9),
             _damage("graffiti: a sprayed tag", "graffiti", 11),
+            _damage("door_gear: a bent bar", "door_gear", 0, missing=0.0, open=0.0),
+            _damage("door_gear: a missing bar", "door_gear", 1, missing=1.0),
+            _damage("door_gear: an open handle", "door_gear", 2, missing=0.0, open=1.0),
         )
     ),
     "light": Section(
