@@ -210,8 +210,8 @@ def _place(c: DoorGearConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage
     low, kink, high = _bend_mm(draw(rng, c.length_mm), height, handle_z, rng)
     apex = round((2 * kink - low - high) / (high - low), 6)
     return Damage(
-        "door_gear", "door", (x, y, (low + high) / 2), up, toward, inward,
-        (high - low, 2 * _AROUND_MM), -draw(rng, c.depth_mm), (apex,), "bent_bar",
+        "door_gear", "door", (x, y, round((low + high) / 2, 2)), up, toward, inward,
+        (round(high - low, 2), 2 * _AROUND_MM), -draw(rng, c.depth_mm), (apex,), "bent_bar",
     )  # fmt: skip
 
 
