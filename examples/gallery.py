@@ -159,6 +159,9 @@ SECTIONS = {
             _damage("rust_through: pits and holes", "rust_through", 3),
             _damage("missing_paint: flaked off", "missing_paint", 9),
             _damage("graffiti: a sprayed tag", "graffiti", 11),
+            _damage("door_gear: a bent bar", "door_gear", 13, missing=0.0, open=0.0),
+            _damage("door_gear: a missing bar", "door_gear", 1, missing=1.0),
+            _damage("door_gear: an open handle", "door_gear", 11, missing=0.0, open=1.0),
         )
     ),
     "light": Section(
@@ -218,8 +221,10 @@ def near_damage(scene: Scene, camera: Camera) -> Camera:
     """Return a camera 1.8 m in front of the scene's damage that looks at it from one side."""
     (damage,) = scene.damages
     target = np.array(damage.origin_mm)
+    # a bar that bows outward shows it only from beside, not from above
+    aside = np.array(damage.across if abs(damage.along[2]) > 0.9 else damage.along)
     away = np.array([0.0, 0.0, 0.2]) - 0.85 * np.array(damage.inward)
-    position = target + 1800.0 * (away + 0.45 * np.array(damage.along))
+    position = target + 1800.0 * (away + 0.45 * aside)
     return replace(
         camera,
         position_mm=tuple(position.tolist()),

@@ -37,7 +37,13 @@ DRAWN_DAMAGE_CLASSES = (*DAMAGE_CLASSES, "scrape")
 """Kinds that every damage program of the renderer can draw. Programs for others are compiled when a
 configuration or scene has them."""
 
-BUNDLED_DAMAGE_CLASSES = (*DRAWN_DAMAGE_CLASSES, "rust_through", "missing_paint", "graffiti")
+BUNDLED_DAMAGE_CLASSES = (
+    *DRAWN_DAMAGE_CLASSES,
+    "rust_through",
+    "missing_paint",
+    "graffiti",
+    "door_gear",
+)
 """Kinds of fastgen; each is a module of fastgen.damages. New ones are appended."""
 
 DAMAGE_GROUP = "fastgen.damages"

@@ -223,8 +223,8 @@ def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
 def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
     """Return the damage target expected from the rays, uint16 [H, W]."""
     order = {"axis": 2, "concave": 3, "dented": 4, "perforation": 5, "scrape": 6}
-    order |= {"rust_through": 7, "missing_paint": 8, "graffiti": 9}
-    order |= {"buckle": 10}  # of the package in docs/extend.md
+    order |= {"rust_through": 7, "missing_paint": 8, "graffiti": 9, "door_gear": 10}
+    order |= {"buckle": 11}  # of the package in docs/extend.md
     values, counts = [], dict.fromkeys(order, 0)
     for damage in scene.damages:
         counts[damage.kind] += 1

@@ -29,8 +29,8 @@ class _Frequencies:
         kinds: Kinds to draw from; all are equally likely. The first four are the paper's. Others
             become further classes of the damage task where they are listed. Installed packages may
             offer more.
-        faces: Faces to draw from; axis damages are not limited to them but take any edge. The
-            extents below are cut to the size of the face.
+        faces: Faces to draw from; axis damages take any edge instead, and door_gear is always on
+            the door. The extents below are cut to the size of the face.
         mask_threshold_mm: Displacement above which a pixel belongs to the mask of a damage. The
             mask of a kind without displacement, such as `scrape`, covers the area that it marks and
             no other damage moves.

@@ -109,7 +109,7 @@ def corners_mm(damage: Damage) -> NDArray[np.float64]:
     depth = abs(damage.depth_mm) + 60.0
     low, high = -depth, inward + inward_mm(damage)
     if form_of(damage).along_edge:
-        low, high = -v, v + depth
+        low, high = -v - outward_mm(damage), v + depth
     axes = np.array([damage.along, damage.across, damage.inward])
     inside = np.array([-u, -v, low]) + UNIT_CUBE * np.array([2 * u, 2 * v, high - low])
     corners: NDArray[np.float64] = np.array(damage.origin_mm) + inside @ axes

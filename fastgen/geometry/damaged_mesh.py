@@ -60,7 +60,7 @@ def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
     kept = np.ones(len(corners), bool)
     made = []
     for damage in damages:
-        if form_of(damage).marked:
+        if form_of(damage).amount is None:
             continue
         near = kept & _within_reach(damage, corners)
         kept &= ~near

@@ -11,18 +11,15 @@ from fastgen.geometry.container_parts import DOOR_FACE_MM
 from fastgen.geometry.door import LEAF_MM, SWAGE, Opening, opening
 from fastgen.geometry.mesh import Chart
 from fastgen.geometry.unfold import Patch, Sheet, beside, box, breaks, prism, regular
-
-BAR_RADIUS_MM = 17.0
-BAR_Y_MM = (-545.0, -130.0, 130.0, 545.0)
-"""Positions of the locking bars. Between the outer ones and the edges, a leaf has room for a serial
-number."""
-
-_BAR_INSET_MM = 31.0
-_BAR_END_MM = 50.0
-"""Distance of the bars' ends from the castings' top and bottom planes."""
-
-_CAM_MM = 76.0
-"""z of the bottom cams, and distance of the top cams below the container's top."""
+from fastgen.scene.locking_bars import (
+    BAR_END_MM,
+    BAR_INSET_MM,
+    BAR_RADIUS_MM,
+    BAR_Y_MM,
+    CAM_MM,
+    HANDLE_INSETS_MM,
+    hasp_mm,
+)
 
 _BACK_MM = LEAF_MM + SWAGE.depth_mm + 4.0
 """Inset of the back of gear on a leaf, behind the deepest swage."""
@@ -74,21 +71,21 @@ def _block(
 
 
 def _bar(layout: Layout, place: Opening, y: float) -> Patch:
-    stations = breaks(_BAR_END_MM, layout.top - _BAR_END_MM, 2 * layout.max_edge_mm)
+    stations = breaks(BAR_END_MM, layout.top - BAR_END_MM, 2 * layout.max_edge_mm)
     # unfolded from its back, which hides the sheet's borders: they rust like edges
-    outline = np.roll(regular((place.x - _BAR_INSET_MM, y), BAR_RADIUS_MM, 8), 4, axis=0)
+    outline = np.roll(regular((place.x - BAR_INSET_MM, y), BAR_RADIUS_MM, 8), 4, axis=0)
     return prism(outline, stations, 2, capped=(True, True))
 
 
 def _cams(layout: Layout, place: Opening, y: float, toward: float) -> list[Patch]:
     """Return the forging at either end: a collar with a nose toward the middle of the door."""
-    x = place.x - _BAR_INSET_MM
+    x = place.x - BAR_INSET_MM
     nose = [(-16.0, -22.0), (16.0, -22.0), (18.0, 10.0), (10.0, 44.0), (-6.0, 44.0), (-18.0, 10.0)]
     outline = np.array([(x + dx, y + toward * dy) for dx, dy in nose])
     if toward < 0:
         outline = outline[::-1]
     patches = []
-    for z in (_CAM_MM, layout.top - _CAM_MM):
+    for z in (CAM_MM, layout.top - CAM_MM):
         patches.append(prism(outline, (z - 18.0, z + 18.0), 2, capped=(True, True)))
     return patches
 
@@ -97,7 +94,7 @@ def _keepers(layout: Layout, place: Opening, y: float) -> list[Patch]:
     """Return two jaws on the sill and on the header, above and below each cam's nose."""
     toward = -np.sign(y)
     patches = []
-    for z in (_CAM_MM, layout.top - _CAM_MM):
+    for z in (CAM_MM, layout.top - CAM_MM):
         for side in (-1.0, 1.0):
             middle = z + side * 27.0
             span = (y + toward * 22.0, y + toward * 58.0)
@@ -115,22 +112,11 @@ def _brackets(place: Opening, y: float) -> list[Patch]:
     return patches
 
 
-def hasp_mm(bar: int) -> tuple[float, float]:
-    """Return y and z of the hasp of a locking bar: the middle of the catch at its handle's end.
-
-    Levers of neighbouring bars have different heights, so that they can overlap.
-    """
-    y = BAR_Y_MM[bar]
-    outer = abs(y) > 300
-    inward = -np.sign(y) if outer else np.sign(y)
-    return y + float(inward) * 300.0, 1120.0 if outer else 980.0
-
-
 def _handle(place: Opening, y: float, end: float, z: float) -> list[Patch]:
     """Return the hub on the bar, the lever along the leaf to y = end, and the catch there."""
     return [
         _block(place, (y - 23, y + 23), (z - 34, z + 34), (_FRONT_MM + 0.5, DOOR_FACE_MM)),
-        _block(place, (y, end), (z - 14, z + 14), (22.0, 34.0)),
+        _block(place, (y, end), (z - 14, z + 14), HANDLE_INSETS_MM),
         _block(place, (end - 38, end + 38), (z - 45, z + 45), (LEAF_MM - 6, _BACK_MM)),
         _block(place, (end - 12, end + 12), (z - 30, z + 24), (16.0, LEAF_MM)),
     ]

@@ -118,8 +118,9 @@ def _damaged(
     known &= (drawn == shot.prepared.numbers.undamaged) | (drawn == value)
     asked = np.flatnonzero(~known)
     rest_mm = points.rest_mm(asked)
-    part = np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm
-    part |= in_hole(damage, rest_mm) | is_marked(damage, rest_mm)
+    part = in_hole(damage, rest_mm) | is_marked(damage, rest_mm)
+    if form_of(damage).marked is None:
+        part |= np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm
     found = asked[part]
     return found, points.within.take(found) & (drawn.take(found) != value)
 

@@ -71,7 +71,7 @@ def sample_contents(
     spots = damage_spots(mesh, damages)
     repairs = sample_repairs(config.markings.repairs, sheets, spots, surface, drawn, streams)
     chalk = sample_chalk(config.markings.chalk, sheets, spots, [*repairs, *drawn], streams)
-    seals = sample_seals(config.seals, streams)
+    seals = sample_seals(config.seals, damages, streams)
     return Contents(container, surface, (*repairs, *drawn, *chalk), damages, seals)
 
 

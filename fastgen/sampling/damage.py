@@ -13,6 +13,7 @@ from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import Damage, Vec3
 from fastgen.scene.damage_kinds import SheetForm, kind_named
 from fastgen.scene.limits import MAX_INSTANCES
+from fastgen.scene.locking_bars import damaged_bars
 
 _CASTING_MM = 350.0
 """Distance from the frame within which the rim of a hole near a casting ends."""
@@ -58,7 +59,7 @@ def sample_damages(
 
     Returns:
         Damages in the container frame, those of listed_kinds first; an empty tuple for an
-        undamaged container.
+        undamaged container. Damages of a locking bar that has one already are left out.
     """
     kinds = listed_kinds(config, streams)
     planes = _planes(size_mm)
@@ -67,7 +68,10 @@ def sample_damages(
     for i, kind in enumerate(map(kind_named, kinds)):
         rng, ranges = streams(f"damage.{i}"), config.ranges_of(kind.name)
         if kind.place is not None:
-            damages.append(kind.place(ranges, size_mm, rng))
+            placed = kind.place(ranges, size_mm, rng)
+            bars = damaged_bars((*damages, placed))
+            if len(bars) == len(set(bars)):
+                damages.append(placed)
             continue
         assert kind.draw is not None, "a kind has either draw or place"
         plane = planes[one_of(rng, config.faces)]

@@ -7,7 +7,7 @@ import numpy as np
 
 from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Damage, Vec2
-from fastgen.scene.damage_kinds import form_of
+from fastgen.scene.damage_kinds import form_of, kind_named
 from fastgen.scene.faces import FACE_AXES, SHEET_FACES
 
 
@@ -28,14 +28,16 @@ class Spot(NamedTuple):
 
 
 def damage_spots(mesh: Mesh, damages: Sequence[Damage]) -> list[Spot]:
-    """Return the place of each damage on a sheet. Damages of edges have none.
+    """Return the place of each damage on a sheet. Damages of edges and door gear have none.
 
     Args:
         mesh: Mesh of the undamaged container.
         damages: Damages of the container.
     """
     made = []
-    for damage in (each for each in damages if each.face in SHEET_FACES):
+    for damage in damages:
+        if damage.face not in SHEET_FACES or kind_named(damage.kind).on_gear:
+            continue
         axes = FACE_AXES[damage.face]
         turn = np.array([axes.right, axes.up]) @ np.transpose([damage.along, damage.across])
         width, height = np.abs(turn) @ damage.size_mm

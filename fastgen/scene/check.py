@@ -21,6 +21,7 @@ from fastgen.scene.limits import (
     MM,
     NEAR_M,
 )
+from fastgen.scene.locking_bars import damaged_bars
 from fastgen.scene.places import check_places, container_boxes, container_names
 from fastgen.validation import check_fields, check_known
 
@@ -117,6 +118,18 @@ def _check_contents(carrier: Scene | Neighbour, path: str, own: OwnDecals) -> No
         _check_decal(decal, f"{path}.decals[{i}]", own)
     for i, damage in enumerate(carrier.damages):
         _check_damage(damage, f"{path}.damages[{i}]")
+    sealed = {seal.hasp for seal in carrier.seals}
+    for bar, count in Counter(damaged_bars(carrier.damages)).items():
+        if count > 1:
+            raise ConfigError(
+                f"{path}.damages: {count} damage the door gear of locking bar {bar}, and a bar has "
+                "at most one such damage; remove some"
+            )
+        if bar in sealed:
+            raise ConfigError(
+                f"{path}.seals: one is at hasp {bar}, but {path}.damages has a damage of its "
+                "locking bar; remove one of them"
+            )
 
 
 def _check_camera(camera: Camera, path: str, scene: Scene) -> None:

@@ -81,27 +81,29 @@ def half_size(damage: Damage) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Form:
-    """One form of a kind of damage. It has either `amount` or `marked`.
+    """One form of a kind of damage. It has `amount`, `marked` or both.
+
+    A form with both moves parts out of sight, and its mask is where `marked` is True.
 
     Attributes:
         name: Value of `Damage.form`.
         glsl: Name in the shaders. The file `shader` defines `DamageField NAME_field(int i, vec3 q)`
             with the displacement, or `DamageMark NAME_mark(int i, vec3 q)` for forms without
-            displacement. Forms with a hole also have `float outside_NAME(int i, vec2 q)`.
+            displacement, or both. Forms with a hole also have `float outside_NAME(int i, vec2 q)`.
         shader: GLSL file, the twin of `amount`, `outline` and `marked`: the name of a file of
             fastgen, or the absolute path of another file.
         amount: Function of a damage and of u, v and w [...] to the displacement along its inward
             axis [...] in mm, without the fade that keeps it off the opposite wall.
         marked: Function of a damage and of u, v and w [...] to bool [...], True where a form
-            without displacement changes the surface.
+            changes the surface without moving it.
         reach: Function of a damage to the distances along and across within which it acts.
         span: Function of a damage to the lowest and the highest displacement of the outermost
             sheet in mm, 0 included. They are bounds that some damages do not reach.
         largest: Function of a damage to the largest magnitude of its displacement in mm.
         outline: Function of a damage and of u and v [...] to the distance [...] in mm outside its
             hole, negative within. None for forms without a hole.
-        along_edge: True for a form that bends an edge of the container. It acts up to its reach
-            across in every direction from the edge, and does not fade.
+        along_edge: True for a form about a line: an edge of the container, or a part of the door
+            gear. It acts up to its reach across in every direction from it, and does not fade.
         parameters: The numbers of `Damage.shape`.
         constants: Macros of the shader by name, and their GLSL text.
     """
@@ -121,8 +123,8 @@ class Form:
 
     def __post_init__(self) -> None:
         """Refuse a form that the renderer cannot draw."""
-        if (self.amount is None) == (self.marked is None):
-            raise ConfigError(f"form {self.name}: give either amount or marked")
+        if self.amount is None and self.marked is None:
+            raise ConfigError(f"form {self.name}: give amount or marked")
         if self.outline is not None and self.amount is None:
             raise ConfigError(f"form {self.name}: a form with an outline, a hole, needs amount")
         if len(self.parameters) > MOST_PARAMETERS:
@@ -186,6 +188,8 @@ class Kind:
         bulge_mm: Function of `ranges` to the largest outward displacement in mm.
         leaks: Whether rust may run down below it.
         rubbed: Whether it may have a scrape beside it.
+        on_gear: Whether it damages the locking bar of the door that is nearest to its origin. A bar
+            has at most one such damage, and then no seal.
     """
 
     name: str
@@ -196,6 +200,7 @@ class Kind:
     bulge_mm: Callable[[Any], float] = lambda _: 0.0
     leaks: bool = False
     rubbed: bool = False
+    on_gear: bool = False
 
     def __post_init__(self) -> None:
         """Refuse names that labels cannot have, and kinds that cannot be drawn."""
