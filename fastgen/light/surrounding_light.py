@@ -183,7 +183,7 @@ def surrounding_light(
         if paving is None:
             factor = 1 - hidden[:, None] + bounced / whole
         else:
-            share, ground, seen = _from_ground(points, toward, i, boxes, faces, sky, paving)
+            share, ground, mirrored = _from_ground(points, toward, i, boxes, faces, sky, paving)
             lower = (1 - toward[:, 2]) / 2
             # boxes cover what is below the horizon and not ground
             taken = np.maximum(hidden - (lower - share), 0.0)
@@ -192,7 +192,7 @@ def surrounding_light(
             behind = _sky_behind(points, covered, [faces[j] for j in others], sky)
             above = left_of_sky(upper, upper - taken[:, None] * behind, open_[:, None])
             factor = (above + ground + bounced) / whole
-            seen = _mean_by_side(seen, normals)
+            seen = _mean_by_side(mirrored, normals)
         bits = _open_bits(points, box, [boxes[j] for j in others])
         found.append(SurroundingLight(np.maximum(factor, 0.02).astype(np.float32), bits, seen))
     return found
@@ -242,7 +242,9 @@ def _sky_behind(points: Array, covered: Array, faces: Sequence[_Faces], sky: Sky
     behind = hidden_sky(sky.light, middles[box, side] - points[at], sky.yaw_deg)
     factor = covered[box, side, at]
     sums = [np.bincount(at, factor * part, len(points)) for part in behind.T]
-    return np.stack(sums, axis=1) / np.maximum(covered.sum(axis=(0, 1)), 1e-9)[:, None]
+    whole = np.maximum(covered.sum(axis=(0, 1)), 1e-9)
+    found: Array = np.stack(sums, axis=1) / whole[:, None]
+    return found
 
 
 def _face_radiance(
