@@ -51,7 +51,7 @@ def contents_of(kind):
 def places(config, count, seed=3):
     """Sample scenes in which all containers of a kind carry the same, which is much faster."""
 
-    def same(config, kind, streams, color=None):
+    def same(config, kind, *_):
         return contents_of(kind)
 
     with pytest.MonkeyPatch.context() as patch:

@@ -1,5 +1,6 @@
 """Sampling of one container: corrugation, paint and ageing, damages, decals and seals."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -48,7 +49,11 @@ class Contents(NamedTuple):
 
 
 def sample_contents(
-    config: Config, kind: str, streams: Streams, color: str | None = None
+    config: Config,
+    kind: str,
+    streams: Streams,
+    seen: Callable[[Damage], bool] = lambda _: True,
+    color: str | None = None,
 ) -> Contents:
     """Sample a container of a kind with everything on it.
 
@@ -56,12 +61,13 @@ def sample_contents(
         config: Distribution of scenes.
         kind: Container kind, a key of `KINDS`.
         streams: Function from the name of a property to its independent random generator.
+        seen: Function from a damage of this container to whether a camera shows it.
         color: Name of its paint; None to draw one.
     """
     scale = float(one_of(streams("corrugation"), config.container.depth_scale))
     container = Container(kind, config.container.profiles.deepened(scale))
     surface = _surface(config.surface, streams, color)
-    damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
+    damages = sample_damages(config.damage, KINDS[kind].size_mm, streams, seen)
     mesh = SHAPES.container(kind, container.profiles)
     sheets = _empty_sheets(container, mesh)
     decals = sample_decals(config.markings, kind, sheets, surface.paint.albedo, streams)

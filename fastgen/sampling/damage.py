@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from fastgen.config.damage import DamageConfig
 from fastgen.damages.draws import FRAME_MM, rounded_vector, turned
 from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import Damage, Vec3
-from fastgen.scene.damage_kinds import SheetForm, kind_named
+from fastgen.scene.damage_kinds import Kind, SheetForm, kind_named
 from fastgen.scene.limits import MAX_INSTANCES
 from fastgen.scene.locking_bars import damaged_bars
 
@@ -20,6 +20,9 @@ _CASTING_MM = 350.0
 
 _SHEET_MM = 15.0
 """Approximate depth of the sheet's outer flats behind the outermost plane of the castings."""
+
+_MOST_DRAWS = 30
+"""Draws of a damage that a camera should show."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ def sample_damages(
     config: DamageConfig,
     size_mm: Vec3,
     streams: Streams,
+    seen: Callable[[Damage], bool],
 ) -> tuple[Damage, ...]:
     """Sample the damages of one container.
 
@@ -56,6 +60,7 @@ def sample_damages(
         config: Probabilities and ranges.
         size_mm: Outer length, width and height of the container.
         streams: Function from the name of a property to its independent random generator.
+        seen: Function from a damage to whether a camera shows it.
 
     Returns:
         Damages in the container frame, those of listed_kinds first; an empty tuple for an
@@ -66,23 +71,41 @@ def sample_damages(
     damages: list[Damage] = []
     beside: list[Damage] = []
     for i, kind in enumerate(map(kind_named, kinds)):
-        rng, ranges = streams(f"damage.{i}"), config.ranges_of(kind.name)
-        if kind.place is not None:
-            placed = kind.place(ranges, size_mm, rng)
-            bars = damaged_bars((*damages, placed))
-            if len(bars) == len(set(bars)):
-                damages.append(placed)
+        rng = streams(f"damage.{i}")
+        aimed = streams(f"damage.{i}.toward").random() < config.toward_cameras
+        for _ in range(_MOST_DRAWS if aimed else 1):
+            damage = _drawn(kind, config, size_mm, planes, rng)
+            if seen(damage):
+                break
+        bars = damaged_bars((*damages, damage))
+        if len(bars) > len(set(bars)):
             continue
-        assert kind.draw is not None, "a kind has either draw or place"
-        plane = planes[one_of(rng, config.faces)]
-        form = kind.draw(ranges, plane.face, plane.size, rng)
-        damages.append(_on_sheet(kind.name, form, plane, rng))
+        damages.append(damage)
+        if kind.draw is None:
+            continue
         rng = streams(f"damage.{i}.scrape")
         scraped = "scrape" in config.kinds and kind.rubbed
         room = len(beside) + len(kinds) < MAX_INSTANCES
         if scraped and rng.random() < config.ranges_of("scrape").beside and room:
-            beside.append(_beside(damages[-1], config, plane, rng))
+            beside.append(_beside(damage, config, planes[damage.face], rng))
     return (*damages, *beside)
+
+
+def _drawn(
+    kind: Kind,
+    config: DamageConfig,
+    size_mm: Vec3,
+    planes: Mapping[str, _Plane],
+    rng: np.random.Generator,
+) -> Damage:
+    """Draw a damage of a kind on a random face or edge."""
+    ranges = config.ranges_of(kind.name)
+    if kind.place is not None:
+        return kind.place(ranges, size_mm, rng)
+    assert kind.draw is not None, "a kind has either draw or place"
+    plane = planes[one_of(rng, config.faces)]
+    form = kind.draw(ranges, plane.face, plane.size, rng)
+    return _on_sheet(kind.name, form, plane, rng)
 
 
 def listed_kinds(config: DamageConfig, streams: Streams) -> list[str]:

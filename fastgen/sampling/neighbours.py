@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from fastgen.config.surroundings import GroundConfig
 from fastgen.errors import ConfigError
 from fastgen.sampling.arrangements import Plan, Site, sample_plan
 from fastgen.sampling.contents import Contents, of_neighbours, sample_contents
-from fastgen.sampling.sight import Sight
+from fastgen.sampling.sight import DamageSight, Sight
 from fastgen.sampling.streams import Streams, one_of, weighted_choice
 from fastgen.scene import Camera, Ground, Neighbour, Pose, Prop, Vec3
 from fastgen.scene.boxes import (
@@ -89,7 +90,7 @@ def sample_surroundings(
 
 
 def sample_neighbours(
-    config: Config, sites: Iterable[Site], first: Contents, streams: Streams
+    config: Config, sites: Iterable[Site], first: Contents, streams: Streams, sight: DamageSight
 ) -> tuple[Neighbour, ...]:
     """Sample the contents of the neighbours at their sites.
 
@@ -98,16 +99,19 @@ def sample_neighbours(
         sites: Kinds and poses of the neighbours.
         first: Contents of the container.
         streams: Function from the name of a property to its independent random generator.
+        sight: The cameras, among the container and the neighbours in the order of their sites.
     """
     theirs = of_neighbours(config)
 
-    def neighbour(site: Site) -> Neighbour:
+    def neighbour(body: int, site: Site) -> Neighbour:
         own = streams_of(site, streams)
         alike = own("same_paint").random() < config.placement.same_paint
         color = first.surface.paint.name if alike else None
-        return Neighbour(site.pose, **sample_contents(theirs, site.kind, own, color)._asdict())
+        seen = partial(sight.shows, body)
+        contents = sample_contents(theirs, site.kind, own, seen, color)
+        return Neighbour(site.pose, **contents._asdict())
 
-    return tuple(map(neighbour, sites))
+    return tuple(itertools.starmap(neighbour, enumerate(sites, start=1)))
 
 
 def streams_of(site: Site, streams: Streams) -> Streams:

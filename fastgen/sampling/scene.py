@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 
 import numpy as np
 
@@ -30,10 +31,12 @@ from fastgen.sampling.neighbours import (
     streams_of,
 )
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
+from fastgen.sampling.sight import DamageSight
 from fastgen.sampling.streams import Streams, one_of, weighted_choice
 from fastgen.scene import (
     Camera,
     EnvironmentView,
+    Pose,
     Scene,
     Spreader,
     Vec3,
@@ -79,13 +82,15 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
         return stream(seed, index, name)
 
     kind = weighted_choice(streams("kind"), config.container.kinds)
-    first = sample_contents(config, kind, streams)
     spreader = _spreader(config.spreader, streams)
     weather = sample_weather(config.weather, lambda part: streams(f"weather.{part}"))
     environment = _environment(config, streams, environments)
     moment = sample_moment(config.sensor.stamp.years, hours_of(environment.name), streams("moment"))
     cameras = [_camera(name, rig, kind, streams) for name, rig in config.cameras.items()]
     around = sample_surroundings(config, kind, spreader.present, cameras, streams)
+    bodies = [(kind, Pose()), *((site.kind, site.pose) for site in around.sites)]
+    sight = DamageSight(around.cameras, bodies)
+    first = sample_contents(config, kind, streams, partial(sight.shows, 0))
     # a spreader of this kind holds one container
     spreader = replace(spreader, present=spreader.present and not around.twins)
     ground = None
@@ -98,7 +103,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
         environment=environment,
         cameras=tuple(_with_sensor(camera, config, moment, streams) for camera in around.cameras),
         spreader=spreader,
-        neighbours=sample_neighbours(config, around.sites, first, streams),
+        neighbours=sample_neighbours(config, around.sites, first, streams, sight),
         ground=ground,
         props=around.props,
         weather=weather,

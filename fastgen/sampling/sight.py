@@ -1,16 +1,25 @@
-"""Estimate of how much of a container other containers hide from a camera."""
+"""Estimates of what a camera sees of containers among others, and of their damages."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.camera.projection import view_of
-from fastgen.scene import Camera
-from fastgen.scene.boxes import OrientedBox
+from fastgen.camera.projection import View, view_of
+from fastgen.scene import Camera, Damage, Pose
+from fastgen.scene.boxes import OrientedBox, container_box, rotation_of
+from fastgen.scene.limits import MM
 
 _STEPS = 8
 """Points along each side of a face."""
+
+_LEAST_TURN = float(np.cos(np.deg2rad(75)))
+"""Least cosine between a damage's outward axis and the way to a camera that shows it."""
+
+_LEAST_SHARE = 1e-3
+"""Least part of the image that a shown damage covers: 410 pixels of 640x640."""
 
 Array = NDArray[np.float64]
 
@@ -46,6 +55,74 @@ class Sight:
     def hide(self, hidden: NDArray[np.bool_]) -> None:
         """Keep points hidden."""
         self._hidden = hidden
+
+
+class DamageSight:
+    """Cameras among containers, for the question whether a camera shows a damage.
+
+    Images are taken as square and without distortion. A damage counts as its rectangle, and other
+    containers hide it if they hide its middle.
+
+    Args:
+        cameras: All cameras of the scene.
+        bodies: Kind and pose of each container.
+    """
+
+    def __init__(self, cameras: Sequence[Camera], bodies: Sequence[tuple[str, Pose]]) -> None:
+        self._cameras = cameras
+        self._bodies = bodies
+
+    @cached_property
+    def _views(self) -> list[View]:
+        return [view_of(replace(camera, lens=None), (1, 1)) for camera in self._cameras]
+
+    @cached_property
+    def _boxes(self) -> list[OrientedBox]:
+        return [container_box(kind, pose) for kind, pose in self._bodies]
+
+    def shows(self, body: int, damage: Damage) -> bool:
+        """Return whether a camera shows a damage as described at `DamageConfig.toward_cameras`.
+
+        Args:
+            body: Index of its container.
+            damage: Damage in the frame of its container.
+        """
+        pose = self._bodies[body][1]
+        turn = rotation_of(pose)
+        middle = np.array(pose.position_mm) + turn @ damage.origin_mm
+        outward = -turn @ damage.inward
+        along, across = (
+            0.5 * extent * (turn @ axis)
+            for extent, axis in zip(damage.size_mm, (damage.along, damage.across), strict=True)
+        )
+        points = middle + np.array([0 * along, -along, along, -across, across])
+        others = [box for i, box in enumerate(self._boxes) if i != body]
+        return any(
+            _turned_to(view, middle, outward)
+            and _large_in(view, points)
+            and not any(box.between(view.position_m / MM, middle) for box in others)
+            for view in self._views
+        )
+
+
+def _turned_to(view: View, middle: Array, outward: Array) -> bool:
+    """Return whether a surface is turned to a camera and not seen at a grazing angle."""
+    way = view.position_m / MM - middle
+    return bool(way @ outward >= _LEAST_TURN * np.linalg.norm(way))
+
+
+def _large_in(view: View, points: Array) -> bool:
+    """Return whether the image contains a rectangle's middle, and enough of it would be covered.
+
+    Args:
+        view: View with an image of one pixel.
+        points: The middle and the middles of opposite sides, two after two, [5, 3] in mm.
+    """
+    (middle, *sides), depth = view.project(points)
+    if depth.min() <= 0 or middle.min() < 0 or middle.max() > 1:
+        return False
+    (x1, y1), (x2, y2) = sides[1] - sides[0], sides[3] - sides[2]
+    return bool(abs(x1 * y2 - x2 * y1) >= _LEAST_SHARE)
 
 
 def _points_toward(box: OrientedBox, eye: Array) -> tuple[Array, Array]:
