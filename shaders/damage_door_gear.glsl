@@ -14,9 +14,9 @@ DamageField bent_bar_field(int i, vec3 q) {
     float half_width = damage_across[i].w;
     float depth = max(abs(q.y), abs(q.z)) < half_width ? damage_inward[i].w : 0.0;
     float t = q.x / half_length;
-    float below = (1.0 + t) / (1.0 + apex), above = (1.0 - t) / (1.0 - apex);
-    float rise = max(min(below, above), 0.0);
-    float slope = below < above ? 1.0 / (1.0 + apex) : -1.0 / (1.0 - apex);
+    float low = (1.0 + t) / (1.0 + apex), high = (1.0 - t) / (1.0 - apex);
+    float rise = max(min(low, high), 0.0);
+    float slope = low < high ? 1.0 / (1.0 + apex) : -1.0 / (1.0 - apex);
     return DamageField(depth * rise, vec3(depth * slope * sign(rise) / half_length, 0.0, 0.0), 0.0);
 }
 
@@ -28,10 +28,10 @@ bool on_missing_bar(int i, vec3 q) {
     bool bar = away.y < MISSING_BAR_THICK_MM && away.x < half_length + MISSING_BAR_CLEAR_MM;
     vec2 from_cam = vec2(away.y, abs(away.x - (half_length - MISSING_BAR_CAM_MM)));
     bool cam = all(lessThan(from_cam, MISSING_BAR_CAM_HALF_MM));
-    float above = abs(q.x - shape.x);
-    bool hub = all(lessThan(vec3(away.y, above, away.z), MISSING_BAR_HUB_MM));
+    float from_handle = abs(q.x - shape.x);
+    bool hub = all(lessThan(vec3(away.y, from_handle, away.z), MISSING_BAR_HUB_MM));
     bool lever = q.y >= 0.0 && q.y < shape.y + MISSING_BAR_CLEAR_MM &&
-                 all(lessThan(vec2(above, abs(q.z + MISSING_BAR_LEVER_FRONT_MM)), HANDLE_HALF_MM));
+                 all(lessThan(vec2(from_handle, abs(q.z + MISSING_BAR_LEVER_FRONT_MM)), HANDLE_HALF_MM));
     return ((bar || cam) && away.z < MISSING_BAR_THICK_MM) || hub || lever;
 }
 

@@ -3,6 +3,7 @@
 // around: Irradiance / pi on the surface. Bend, width and lean of the lobe are fitted as in
 // lobe_visibility.glsl.
 
+#include "scene.block"
 #include "brdf.glsl"
 #include "environment_map.glsl"
 #include "lobe_direction.glsl"
@@ -34,8 +35,8 @@ vec3 environment_mirror(BrdfTerms r, SkyVisibility sky, vec3 around) {
     // the mean radiance of four HDRIs.
     float spread = fma(1.95 * width, width, 0.02);
     float below = 0.5 - 0.5 * mirror.z * inversesqrt(fma(mirror.z, mirror.z, spread * spread));
-    float above = 0.5 * (direction.z + length(vec2(direction.z, 1.3 * spread)));
-    direction.z = mix(direction.z, above, ground_seen[0].w);
+    float raised = 0.5 * (direction.z + length(vec2(direction.z, 1.3 * spread)));
+    direction.z = mix(direction.z, raised, ground_seen[0].w);
     below *= ground_seen[0].w;
     vec3 seen = mix(prefiltered(direction, width), ground_radiance(r.normal), below);
     return mix(sky.occluder_albedo * around, seen, open);
