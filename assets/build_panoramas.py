@@ -9,8 +9,9 @@ port: shapes, materials, models, layout and sky. Cycles traces the objects on th
 and the sun's disc are added from exact maps afterwards, so that the disc keeps its energy and the
 sky has no noise. Beside each panorama, NAME.containers.png numbers the containers that it shows.
 
-The variants with a `place` (gate, aisle and rail, by day, night, rain and fog) are not part of the
-package. Render them with `--out` into a folder for `--hdri`.
+The night of the gate and of the aisle and the dusk at the rails are not part of the package: at the
+night of the gate, denoising leaves red stains on the ground. Render them with `--out` into a folder
+for `--hdri`.
 """
 
 import argparse
@@ -143,17 +144,19 @@ def write_index(folder: Path) -> None:
         file = f"{v.name}.exr"
         if not (folder / file).exists():
             continue
+        kinds = [*v.kind, v.place] if v.place else list(v.kind)
         lux = {key: value for key, value in index.get(v.name, {}).items() if key == "lux"}
         index[v.name] = {
-            **lux,
             "file": file,
-            "kind": list(v.kind),
+            "kind": kinds,
             "licence": "Apache-2.0",
             "source": "assets/build_panoramas.py",
+            **lux,
         }
         if f"| {file} |" not in text:
-            row = ("our own", "build_panoramas.py", "fastgen", "Apache-2.0", ", ".join(v.kind))
-            text += f"| {file} | {' | '.join(row)} |\n"
+            row = ("our own", "build_panoramas.py", "fastgen", "Apache-2.0", ", ".join(kinds))
+            end = text.rindex("|\n") + 2  # of the table
+            text = f"{text[:end]}| {file} | {' | '.join(row)} |\n{text[end:]}"
     listed.write_text(json.dumps(index, indent=2) + "\n", encoding="utf-8")
     sources.write_text(text, encoding="utf-8")
 

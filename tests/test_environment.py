@@ -318,15 +318,16 @@ def test_bundled_environments_are_complete_free_and_varied():
     assert {"day", "night", "dusk", "overcast", "urban", "industrial", "port"} <= kinds
 
 
-def test_ports_weigh_more_than_other_places_and_interiors_nothing():
+def test_ports_weigh_more_than_other_places_and_special_ones_nothing():
     folder = next(iter(bundled_hdris().values())).parent
     index = json.loads((folder / "index.json").read_text(encoding="utf-8"))
     weights = bundled_weights()
     assert list(weights) == list(bundled_hdris())
     for name, weight in weights.items():
         kind = set(index[name]["kind"])
-        assert (weight == 0) == ("interior" in kind)
-        assert (weight > 1) == ("port" in kind)
+        special = bool(kind & {"interior", "gate", "aisle", "rail"})
+        assert (weight == 0) == special
+        assert (weight > 1) == ("port" in kind and not special)
 
 
 def test_scenes_follow_the_weights_unless_environments_are_named():

@@ -100,14 +100,22 @@ _HOURS = {
 tenth are at dusk, and the rest at night. This is a choice; `fastgen fit` finds the weights of a
 camera."""
 
-_ON_GROUND: dict[str, Any] = {
-    **_OUTDOORS,
-    "environment": {
+_GATES = {"port_gate": 14.0, "port_gate_rain": 9.0}
+_YARDS = {"port_aisle": 9.0, "port_aisle_fog": 5.0, "port_rail": 6.0, "port_rail_rain": 4.0}
+
+
+def _on_ground(places: dict[str, float]) -> dict[str, Any]:
+    """Return the same for presets with a ground, which must blend into that of the HDRI.
+
+    Args:
+        places: Weights of HDRIs that were taken where the containers stand.
+    """
+    environment = {
         **_OUTDOORS["environment"],
-        "weights": {**_HOURS, **dict.fromkeys(_UNPAVED, 0.0)},
-    },
-}
-"""The same for presets with a ground, which must blend into that of the HDRI."""
+        "weights": {**_HOURS, **dict.fromkeys(_UNPAVED, 0.0), **places},
+    }
+    return {**_OUTDOORS, "environment": environment}
+
 
 _GATE_END = {
     "focal_mm": 30.0,
@@ -160,7 +168,7 @@ PRESETS: dict[str, Preset] = {
     "gate": Preset(
         "trailers in the lanes of a gate, seen from portals near by",
         {
-            **_ON_GROUND,
+            **_on_ground(_GATES),
             "markings": {"marked_containers": 0.15},
             "spreader": {"probability": 0.0},
             "placement": {
@@ -194,7 +202,7 @@ PRESETS: dict[str, Preset] = {
     "yard": Preset(
         "piles and rows on the ground, seen from a reach stacker, poles and a mast",
         {
-            **_ON_GROUND,
+            **_on_ground(_YARDS),
             "markings": {"marked_containers": 0.1},
             "spreader": {"probability": 0.0},
             "placement": {
@@ -229,7 +237,7 @@ PRESETS: dict[str, Preset] = {
     "quay": Preset(
         "containers under a ship-to-shore crane: in the air, on trailers, on the quay",
         {
-            **_ON_GROUND,
+            **_on_ground({}),
             "markings": {"marked_containers": 0.35},
             "spreader": {"probability": 0.6},
             "placement": {

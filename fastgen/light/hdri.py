@@ -35,6 +35,9 @@ MIN_WIDTH, MAX_WIDTH = 256, 16384
 PORT_WEIGHT = 2.5
 """Weight of bundled ports in the draw of environments; other outdoor environments have 1."""
 
+_SPECIAL = frozenset(("interior", "gate", "aisle", "rail"))
+"""Kinds of environments that only some cameras see."""
+
 _ASPECT_TOLERANCE = 0.02
 _MAX_RADIANCE = 1e9  # the disc of the sun has 1.6e9 cd/m2; more could overflow a float32 sum
 
@@ -107,11 +110,12 @@ def bundled_hdris() -> dict[str, Path]:
 def bundled_weights() -> dict[str, float]:
     """Return the weight of every bundled environment in the random draw, sorted by name.
 
-    Interiors have weight 0: they are used only if a configuration names them.
+    Interiors, and places of a port without cranes, have weight 0: they are used only if a
+    configuration names them.
     """
     kinds = {name: entry["kind"] for name, entry in _index().items()}
     return {
-        name: 0.0 if "interior" in kind else PORT_WEIGHT if "port" in kind else 1.0
+        name: 0.0 if _SPECIAL & set(kind) else PORT_WEIGHT if "port" in kind else 1.0
         for name, kind in kinds.items()
     }
 
