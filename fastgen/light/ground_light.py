@@ -60,7 +60,10 @@ class GroundLight:
     face_radiance: NDArray[np.float32]
 
     def at(self, place_m: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Return the texels [K, 4] at world places [K, 2], interpolated; the border goes on."""
+        """Return the texels [K, 4] at world places [K, 2] in m, interpolated.
+
+        Places outside the grid have those of its border.
+        """
         column, row = np.asarray((place_m - self.low_m) / self.step_m, np.float32).T
         found = cv2.remap(
             self.texels, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
@@ -77,15 +80,15 @@ def mean_albedo(ground: Ground) -> Color:
 
 
 def left_of_sky(whole: ArrayLike, left: ArrayLike, share: ArrayLike) -> NDArray[np.floating]:
-    """Return light of which something hides a part, by two estimates; all shapes broadcast.
+    """Return the light that something leaves of the sky's, from two estimates.
 
-    The radiance of what is hidden is known only roughly, so the less is left, the less it may
-    differ from the same share of the whole.
+    The radiance of the hidden sky is known only roughly. Therefore the result may differ less from
+    `share * whole` if less is left. All shapes broadcast.
 
     Args:
-        whole: All light.
-        left: The light less what is estimated to be hidden of it.
-        share: Share of an even light that is left.
+        whole: Light of the whole sky.
+        left: The same without the light that is estimated to be hidden.
+        share: Share that would be left of an even sky.
     """
     even = np.asarray(whole) * share
     most = 1 + np.asarray(share)

@@ -22,7 +22,7 @@ _BESIDE_M = 0.3
 """Distance before the face of a prop at which the ground stands for what is around the face."""
 
 _LOWEST, _OPEN_M = 0.55, 0.4
-"""Share of its light that a prop has at the ground, and height above which it has all of it."""
+"""Share of the light around it that a prop gets at the ground, and height of the full share."""
 
 
 class LitMember(NamedTuple):
