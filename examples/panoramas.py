@@ -1,6 +1,6 @@
 """Picture of the panoramas of the port with their names: docs/panoramas.jpg.
 
-    python examples/panoramas.py docs/panoramas.jpg
+python examples/panoramas.py docs/panoramas.jpg
 """
 
 import argparse
