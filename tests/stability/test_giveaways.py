@@ -143,7 +143,7 @@ def test_traces_of_rendering_tell_labels_no_better_on_the_pixel_grid_than_beside
     config = Config.from_values(DAMAGED)
     names, scores = {0: [], 1: []}, {0: [], 1: []}
     with Generator(config, seed=5, size=(400, 400), quality=quality) as generator:
-        for index, camera in itertools.product(range(3), ("A", "B", "Cl", "Cr")):
+        for index, camera in itertools.product(range(6), ("A", "B", "Cl", "Cr")):
             sample = generator.render(index, camera=camera)
             classes = classes_of(sample)
             for shift in (0, 1):
@@ -161,10 +161,8 @@ def test_traces_of_rendering_tell_labels_no_better_on_the_pixel_grid_than_beside
             assert marked.sum() > 20, name
             every = np.concatenate(scores[shift], axis=1)[:, chosen]
             apart.append(np.array([separation(each, marked) for each in every]))
-        # Quads of one object resemble each other, so AUCs differ by chance by a few hundredths, and
-        # by more for few quads: the standard error of each is about 0.3 / sqrt(N).
-        chance = 0.1 + 0.5 / np.sqrt(marked.sum())
-        assert (apart[0] < apart[1] + chance).all(), (name, marked.sum(), apart)
+        # quads of one object resemble each other, so AUCs differ by chance by a few hundredths
+        assert (apart[0] < apart[1] + 0.1).all(), (name, apart)
 
 
 def test_damage_does_not_change_where_cables_get_more_samples():
