@@ -73,9 +73,9 @@ def sample_damages(
     for i, kind in enumerate(map(kind_named, kinds)):
         rng = streams(f"damage.{i}")
         aimed = streams(f"damage.{i}.toward").random() < config.toward_cameras
-        for _ in range(_MOST_DRAWS if aimed else 1):
+        for _ in range(_MOST_DRAWS):
             damage = _drawn(kind, config, size_mm, planes, rng)
-            if seen(damage):
+            if not aimed or seen(damage):
                 break
         bars = damaged_bars((*damages, damage))
         if len(bars) > len(set(bars)):

@@ -24,7 +24,7 @@ def sample_seals(
         damages: Damages of the container.
         streams: Returns the random generator of a property by its name.
     """
-    rng = streams("seals")
+    rng, damaged = streams("seals"), damaged_bars(damages)
     if rng.random() >= config.probability:
         return ()
     count = 1 + int(rng.random() < config.second)
@@ -38,5 +38,5 @@ def sample_seals(
             albedo=linear_color(one_of(rng, config.colors)),
         )
         for hasp in sorted(hasps.tolist())
-        if hasp not in damaged_bars(damages)
+        if hasp not in damaged
     )
