@@ -20,6 +20,12 @@ from fastgen.torch import (
 )
 
 
+# Panoramas that version 0.23 lacked.
+ADDED = {
+    *("port_gate", "port_gate_rain", "port_aisle", "port_aisle_fog", "port_rail", "port_rail_rain"),
+}
+
+
 def digest(state):
     return hashlib.sha256(json.dumps(with_floats(state)).encode()).hexdigest()
 
@@ -28,10 +34,11 @@ def with_floats(value):
     """Turn all numbers into floats, as one state may have 12 and the other 12.0.
 
     The configuration, its class lists, the digests of a curriculum's configurations and those of
-    container maps, are dropped; version 0.23 lacked some of them.
+    container maps, and the panoramas of later versions are dropped; version 0.23 lacked some of
+    them.
     """
     if isinstance(value, dict):
-        dropped = ("config", "classes", "curriculum", "containers")
+        dropped = {"config", "classes", "curriculum", "containers", *ADDED}
         kept = {key: item for key, item in value.items() if key not in dropped}
         return {key: with_floats(item) for key, item in kept.items()}
     if isinstance(value, list | tuple):
