@@ -31,6 +31,7 @@ CAMERAS = (
     Camera("side", (9000.0, -8000.0, 4500.0), (1000.0, 0.0, 0.0), 26.0, roll_deg=8.0),
     Camera("low", (-9000.0, 7000.0, 300.0), (0.0, 0.0, 300.0), 24.0),
     Camera("down", (500.0, 6000.0, 9000.0), (500.0, 1500.0, 0.0), 30.0),
+    Camera("beside", (2900.0, -1900.0, 500.0), (-2000.0, -1000.0, 0.0), 18.0),
     Camera("bent", (9000.0, 8000.0, 3000.0), (0.0, 0.0, 0.0), 18.0, lens=LENSES[1]),
 )
 
@@ -61,7 +62,7 @@ def boxes_of(rng, count):
 @pytest.mark.parametrize("lens", LENSES)
 def test_boxes_touch_and_fill_the_tiles_whose_rays_they_meet(lens):
     rng = np.random.default_rng(1)
-    touched_pixels = met_tiles = filled_pixels = 0
+    touched_tiles = met_tiles = filled_pixels = beside = 0
     for view in views(rng, 40, lens):
         bodies = boxes_of(rng, 5)
         tiles = Tiles(view)
@@ -74,14 +75,15 @@ def test_boxes_touch_and_fill_the_tiles_whose_rays_they_meet(lens):
             met = (enters < leaves) & (leaves > 0)
             any_met |= met
             assert not (met & ~spread(mask)).any()
-            if (view.to_view(body.corners_mm)[:, 2] > 0.1).all():
-                rows, columns = np.nonzero(met)
-                met_tiles += len(np.unique(rows // TILE_PX * 100 + columns // TILE_PX))
-                touched_pixels += mask.sum()
+            rows, columns = np.nonzero(met)
+            met_tiles += len(np.unique(rows // TILE_PX * 100 + columns // TILE_PX))
+            touched_tiles += mask.sum()
+            beside += (view.to_view(body.corners_mm)[:, 2] < 0).any() and met.any()
         filled = spread(tiles.filled(corners))
         assert any_met[filled].all()
         filled_pixels += filled.sum()
-    assert touched_pixels < 1.2 * met_tiles
+    assert touched_tiles < 1.2 * met_tiles
+    assert beside > 5
     assert filled_pixels > 20000
 
 

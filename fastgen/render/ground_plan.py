@@ -16,9 +16,9 @@ from fastgen.render.constants import GROUND_FADE_START
 from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
 from fastgen.scene import Ground, Prop
-from fastgen.scene.boxes import OrientedBox, prop_box
+from fastgen.scene.boxes import OrientedBox, away_mm, prop_box
 from fastgen.scene.damage_kinds import form_of
-from fastgen.scene.limits import MM
+from fastgen.scene.limits import MM, NEAR_M
 
 _SHADED_MM = 600.0
 """Distance from a prop within which it shades the ground, see ground_props.glsl."""
@@ -30,6 +30,10 @@ _LONGEST_SHADOW_MM = 60000.0
 
 _SKIN_MM = 150.0
 """Depth below its outer box from which an undamaged container hides what is behind it."""
+
+_LEAST_AWAY_MM = 5 * NEAR_M / MM
+"""Distance to the camera from which no part of a container is in front of the near plane; rays are
+at most 78 degrees off the axis."""
 
 _BOX_COUNTS = (0, 1, 2, 4, 8, MAX_BOXES)
 """Numbers of containers that programs are compiled for."""
@@ -91,7 +95,8 @@ def ground_plan(
     seen, near = _plane_tiles(tiles, ground)
     shown = shaded = dark = _none(tiles)
     masks = None
-    solids = [solid for member in members if (solid := _solid_mm(member)) is not None]
+    eye_mm = view.position_m / MM
+    solids = [solid for each in members if (solid := _solid_mm(each, eye_mm)) is not None]
     hidden = tiles.filled(np.reshape(solids, (-1, 8, 3)))
     if props:
         parts = [prop_box(prop) for prop in props]
@@ -152,11 +157,13 @@ def _plane_tiles(tiles: Tiles, ground: Ground) -> tuple[Mask, Mask]:
     return seen, near
 
 
-def _solid_mm(member: Member) -> Array | None:
+def _solid_mm(member: Member, eye_mm: Array) -> Array | None:
     """Return corners [8, 3] of a box through which nothing behind a container is seen.
 
-    None for a container with holes, or with too deep dents.
+    None for a container with holes, with too deep dents, or beside the camera.
     """
+    if away_mm(member.box, eye_mm) < _LEAST_AWAY_MM:
+        return None
     damages = member.prepared.scene.damages
     skin_mm = _SKIN_MM + sum(map(inward_mm, damages))
     half = member.box.half_mm - skin_mm

@@ -25,6 +25,10 @@ _SIDES = np.array(
 )
 """Points [4, 17, 2] on the sides of the unit square, which lens distortion curves."""
 
+_LEAST_DEPTH_M = NEAR_M / 8
+"""Depth up to which hulls are cut off. Drawn points are at least NEAR_M away from the camera and at
+most 80 degrees off its axis, so they are deeper."""
+
 
 def bands(regions: Sequence[Region | None]) -> list[Region | None]:
     """Return disjoint regions that cover all given regions, with one interval in each row.
@@ -132,27 +136,24 @@ def around(regions: Sequence[Region]) -> Region:
     return left, top, right - left, bottom - top
 
 
-def region_of(view: View, corners_mm: np.ndarray) -> Region | None:
-    """Return the region that the convex hull of some points may cover.
+def region_of(view: View, corners_mm: np.ndarray) -> Region:
+    """Return the region that the part of a convex hull before the camera may cover.
 
     Args:
         view: Projection of the image.
         corners_mm: Points [N, 3] in the container frame.
 
     Returns:
-        Region aligned to 2x2 pixel blocks, which classify.comp needs; None if a point lies nearer
-        than the near plane.
+        Region aligned to 2x2 pixel blocks, which classify.comp needs. It is empty for a hull behind
+        the camera or outside the image.
     """
-    corners, (near,) = hull_corners(view, corners_mm[None])
-    if near:
-        return None
-    x0, y0, x1, y1 = corners[0].tolist()
+    x0, y0, x1, y1 = hull_corners(view, corners_mm[None])[0][0].tolist()
     return x0, y0, x1 - x0, y1 - y0
 
 
 def hull_corners(
     view: View, points_mm: NDArray[np.floating]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.int64], list[NDArray[np.float64]]]:
     """Return the rectangles that the convex hulls of several groups of points may cover.
 
     Args:
@@ -161,13 +162,20 @@ def hull_corners(
 
     Returns:
         int [N, 4]: first column and row, and the column and row after the last, all even or at the
-        border of the image. They are those of the whole image for groups with a point nearer than
-        the near plane. bool [N]: True for these groups.
+        border of the image. A list of N groups of points [K, 2] in the plane at depth 1 of a
+        pinhole camera; their hulls are the parts of the given hulls before the camera. K is 0, and
+        the rectangle empty, for a group behind the camera.
     """
     seen = view.to_view(points_mm)
-    near = seen[..., 2].min(axis=1) <= NEAR_M
-    plane = seen[..., :2] / np.maximum(seen[..., 2:], NEAR_M)
-    low, high = plane.min(axis=1), plane.max(axis=1)
+    plane = seen[..., :2] / np.maximum(seen[..., 2:], _LEAST_DEPTH_M)
+    low, high, hulls = plane.min(axis=1), plane.max(axis=1), list(plane)
+    behind = []
+    for k in np.flatnonzero(seen[..., 2].min(axis=1) < _LEAST_DEPTH_M):
+        hulls[k] = _before_camera(seen[k])
+        if len(hulls[k]):
+            low[k], high[k] = hulls[k].min(axis=0), hulls[k].max(axis=0)
+        else:
+            behind.append(k)
     margin = np.ones((len(plane), 1))
     if view.distortion:
         # the image of a rectangle around the hull is bounded by that of the rectangle's border
@@ -181,9 +189,27 @@ def hull_corners(
     center = np.array(view.center_px)
     first = 2 * np.floor((view.focals_px * low + center - margin) / 2)
     last = 2 * np.ceil((view.focals_px * high + center + margin) / 2)
-    first[near], last[near] = 0, view.size
+    first[behind] = last[behind] = 0
     corners = np.concatenate([np.clip(first, 0, view.size), np.clip(last, 0, view.size)], axis=1)
-    return corners.astype(np.int64), near
+    return corners.astype(np.int64), hulls
+
+
+def _before_camera(seen: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points [K, 2] in the plane at depth 1, whose hull is the part of a hull deep enough.
+
+    Besides the deep points, these are the points where lines from them to the others are just deep
+    enough.
+
+    Args:
+        seen: Points [P, 3] in the camera frame.
+    """
+    depth = seen[:, 2]
+    far, near = seen[depth >= _LEAST_DEPTH_M], seen[depth < _LEAST_DEPTH_M]
+    share = (_LEAST_DEPTH_M - near[None, :, 2:]) / (far[:, None, 2:] - near[None, :, 2:])
+    crossed = near[None] + share * (far[:, None] - near[None])
+    points = np.concatenate([far, crossed.reshape(-1, 3)])
+    plane: NDArray[np.float64] = points[:, :2] / np.maximum(points[:, 2:], _LEAST_DEPTH_M)
+    return plane
 
 
 def box_corners(

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from fastgen.camera.projection import View
 from fastgen.render.constants import TILE_PX
 from fastgen.render.regions import hull_corners
-from fastgen.scene.limits import NEAR_M
 
 _FEW = 3
 """A body over at most so many tiles keeps all tiles of its rectangle."""
@@ -90,16 +89,15 @@ class Tiles:
     def _hulls(self, points_mm: Array) -> Iterator[tuple[tuple[slice, slice], Array | None]]:
         """Yield the rows and columns that groups of points may touch, and their hulls.
 
-        A hull is its corners [E, 2] in the plane; None if a point is nearer than the near plane.
+        A hull is its corners [E, 2] in the plane; None if it is outside the image.
         """
-        rectangles, near = hull_corners(self.view, points_mm)
+        rectangles, hulls = hull_corners(self.view, points_mm)
         first, last = rectangles[:, :2] // TILE_PX, -(-rectangles[:, 2:] // TILE_PX)
-        seen = self.view.to_view(points_mm)
-        plane = (seen[..., :2] / np.maximum(seen[..., 2:], NEAR_M)).astype(np.float32)
-        for (x0, y0), (x1, y1), whole, points in zip(
-            first.tolist(), np.maximum(first, last).tolist(), near.tolist(), plane, strict=True
+        for (x0, y0), (x1, y1), points in zip(
+            first.tolist(), np.maximum(first, last).tolist(), hulls, strict=True
         ):
-            hull = None if whole or x0 == x1 or y0 == y1 else cv2.convexHull(points)[:, 0]
+            seen = x0 < x1 and y0 < y1
+            hull = cv2.convexHull(points.astype(np.float32))[:, 0] if seen else None
             yield (slice(y0, y1), slice(x0, x1)), hull
 
     def _beyond(self, hull: Array, part: tuple[slice, slice]) -> Array:
