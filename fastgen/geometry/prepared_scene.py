@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.decal_facets import DecalSurface
-from fastgen.geometry.facets import Facets, damage_facets
+from fastgen.geometry.facets import Facets, damage_facets, mesh_facets
 from fastgen.geometry.mesh import UNIT_CUBE, UNIT_CUBE_TRIANGLES, Mesh
 from fastgen.geometry.seals import SceneSeals, scene_seals
 from fastgen.geometry.shape_library import SHAPES, ShapeLibrary, SpreaderShape
@@ -192,6 +192,11 @@ class PreparedScene:
             damage = self.scene.damages[number]
             facets = self._damage_facets[number] = damage_facets(self.scene, self.container, damage)
         return facets
+
+    @cached_property
+    def facets(self) -> Facets:
+        """All triangles of the container after damage, in the container frame."""
+        return mesh_facets(self.container, self.scene.damages)
 
     @cached_property
     def corners_mm(self) -> Array:

@@ -4,7 +4,7 @@ A pixel is covered if its centre lies in one of the object's facets that face th
 on an edge belongs to one side only, as in rasterizers (OpenGL 4.5 core specification, 14.6.1).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -94,6 +94,17 @@ def project(facets: Facets, view: View) -> Projected:
         facets = facets.beyond(depth - NEAR_M)
         pixels, depth = view.project(facets.points_mm)
     return Projected(facets, pixels, depth)
+
+
+def pixels_beyond(facets: Facets, view: View) -> Array:
+    """Return image positions [P, 2] of all corners of the part of facets beyond the near plane."""
+    pixels, depth = view.project(facets.points_mm)
+    distance = depth - NEAR_M
+    before = (distance < 0).take(facets.corners)
+    crossing = before.any(axis=1) & ~before.all(axis=1)
+    cut = replace(facets, corners=facets.corners.compress(crossing, axis=0)).beyond(distance)
+    more, _ = view.project(cut.points_mm)
+    return np.concatenate([pixels.compress(distance >= 0, axis=0), more])
 
 
 def facing(polygons: Array) -> NDArray[np.bool_]:

@@ -11,10 +11,10 @@ from fastgen.camera.projection import View
 from fastgen.classes import ALL_DAMAGE_CLASSES, SPREADER_ID
 from fastgen.geometry.decal_facets import DecalSurface
 from fastgen.geometry.decal_outlines import EDGE_POINTS
-from fastgen.geometry.facets import Facets, mesh_facets
+from fastgen.geometry.facets import Facets
 from fastgen.geometry.prepared_scene import CORNER_SIGNS
 from fastgen.geometry.ray_triangles import RayTriangles
-from fastgen.labels.coverage import boxes, covered, facing, project
+from fastgen.labels.coverage import boxes, covered, facing, pixels_beyond, project
 from fastgen.labels.damage import damage_objects
 from fastgen.labels.seals import seal_objects
 from fastgen.labels.visibility import Shot, float_boxes, mask_box, visibility
@@ -165,7 +165,7 @@ def _container(shot: Shot) -> Object:
     pixels, depth = view.project(points)
     passes_camera = depth.min() < NEAR_M
     if passes_camera:
-        pixels = project(mesh_facets(prepared.container, shot.scene.damages), view).pixels
+        pixels = pixels_beyond(prepared.facets, view)
     (bounds,) = boxes(pixels, np.zeros(len(pixels), np.int64), 1)
     sides = corners[list(_SIDES)]
     if shot.lens:
