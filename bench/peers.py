@@ -109,6 +109,8 @@ PEERS = (
     ),
     Peer("Cycles 16 spp denoised + id render", arguments=("denoise",), samples=16, **_CYCLES),
     Peer("Cycles 128 spp + a mask per marker", arguments=("masks",), samples=128, **_CYCLES),
+    Peer("Cycles as set up by Kubric", arguments=("kubric",), samples=128, **_CYCLES),
+    Peer("Cycles as set up by BlenderProc", arguments=("blenderproc",), samples=1024, **_CYCLES),
 )
 
 
@@ -252,7 +254,7 @@ def main() -> None:
         "--repeats", type=int, default=5, help="draws per view; Cycles draws each once"
     )
     parser.add_argument(
-        "--samples", type=int, help="samples per pixel of Cycles, instead of 16 and 128"
+        "--samples", type=int, help="samples per pixel of Cycles, instead of 16 to 1,024"
     )
     charts.add_options(parser, "peers")
     options = parser.parse_args()

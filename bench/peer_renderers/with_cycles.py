@@ -1,13 +1,12 @@
-"""Cycles through bpy: python with_cycles.py JOB OUT denoise|masks.
+"""Cycles through bpy: python with_cycles.py JOB OUT WAY, where WAY is one of WAYS.
 
-The way 'masks' makes labels like the paper, with one binary render per visible marker.
-
-The way 'denoise' adds Open Image Denoise to the colour image and draws all ids in one flat render,
-which is the fastest way to get labels from Cycles.
+The number of samples is part of the job.
 """
 
 import sys
 import tempfile
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -19,7 +18,40 @@ ID_STEP = 4
 """Distance of two ids in grey levels of 255."""
 
 
-def open_scene(job: Job, scene: SceneJob, denoise: bool) -> dict[int, bpy.types.Object]:
+@dataclass(frozen=True)
+class Way:
+    """A way to make labelled images.
+
+    Attributes:
+        denoise: Add Open Image Denoise to the colour image.
+        noise: Noise threshold at which a pixel gets no more samples; 0 for the same number of
+            samples in all pixels.
+        bounces: Most bounces of light, in all (max) and by kind of surface.
+        masks: Make a binary render for each visible marker, not one flat render of all ids.
+    """
+
+    denoise: bool = True
+    noise: float = 0.0
+    bounces: dict[str, int] = field(default_factory=lambda: {"max": 12})
+    masks: bool = False
+
+
+WAYS = {
+    "denoise": Way(),
+    # the SeaFront paper
+    "masks": Way(denoise=False, masks=True),
+    # blenderproc/python/utility/DefaultConfig.py of BlenderProc 2
+    "blenderproc": Way(
+        noise=0.01, bounces={"max": 3, "diffuse": 3, "glossy": 0, "transmission": 0}
+    ),
+    # kubric/renderer/blender.py; the threshold and the bounces are Blender's defaults
+    "kubric": Way(noise=0.01, bounces={"max": 12, "diffuse": 4, "glossy": 4, "transmission": 12}),
+}
+"""Ways by name. One flat render of all ids is the fastest way to get labels from Cycles, and also
+BlenderProc's own. Kubric reads labels from a Cryptomatte pass of the colour image instead."""
+
+
+def open_scene(job: Job, scene: SceneJob) -> dict[int, bpy.types.Object]:
     """Load the GLB and its HDR light for Cycles on all cores; return the objects by id."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=str(scene.glb))
@@ -29,9 +61,7 @@ def open_scene(job: Job, scene: SceneJob, denoise: bool) -> dict[int, bpy.types.
     settings.render.resolution_x, settings.render.resolution_y = job.size
     settings.render.use_persistent_data = True  # keeps the ray-tracing tree between views
     settings.cycles.device = "CPU"
-    settings.cycles.use_adaptive_sampling = False
     settings.cycles.denoiser = "OPENIMAGEDENOISE"
-    settings.cycles.use_denoising = denoise
     settings.render.image_settings.file_format = "PNG"
     settings.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     settings.collection.objects.link(settings.camera)
@@ -69,14 +99,17 @@ def aim(shot: Shot, width: int) -> None:
     camera.data.clip_start, camera.data.clip_end = 0.1, 200.0
 
 
-def shade(job: Job, shot: Shot, denoise: bool) -> None:
+def shade(job: Job, shot: Shot, way: Way) -> None:
     """Set Cycles up for a colour image."""
     settings = bpy.context.scene
     settings.view_layers[0].material_override = None
     settings.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 1.0
     settings.cycles.samples = job.samples
-    settings.cycles.use_denoising = denoise
-    settings.cycles.max_bounces = 12
+    settings.cycles.use_adaptive_sampling = way.noise > 0
+    settings.cycles.adaptive_threshold = way.noise
+    settings.cycles.use_denoising = way.denoise
+    for name, most in way.bounces.items():
+        setattr(settings.cycles, f"{name}_bounces", most)
     settings.cycles.filter_width = 1.5
     settings.view_settings.view_transform = "Standard"
     settings.view_settings.exposure = float(np.log2(shot.exposure))
@@ -89,6 +122,7 @@ def paint(flat: bpy.types.Material) -> None:
     settings.view_layers[0].material_override = flat
     settings.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
     settings.cycles.samples = 1
+    settings.cycles.use_adaptive_sampling = False
     settings.cycles.use_denoising = False
     settings.cycles.max_bounces = 0
     settings.cycles.filter_width = 0.01
@@ -134,34 +168,31 @@ def all_ids(objects: dict[int, bpy.types.Object], folder: Path) -> np.ndarray:
     return np.rint(draw(folder)[..., 0] / ID_STEP)
 
 
-def main(folder: Path, out: Path, way: str) -> None:
+def main(folder: Path, out: Path, way: Way) -> None:
     """Render every view."""
     job = read_job(folder)
     recorder = Recorder(out, f"Blender {bpy.app.version_string}")
-    denoise = way == "denoise"
     with tempfile.TemporaryDirectory() as place:
         for scene in job.scenes:
             with recorder.lap("set-up"):
-                objects = open_scene(job, scene, denoise)
+                objects = open_scene(job, scene)
                 flat = flat_material()
             # all colours, then all labels, because switching makes Cycles prepare the scene again
             images = {}
             for shot in scene.shots * job.repeats:
                 with recorder.lap("colour"):
                     aim(shot, job.size[0])
-                    shade(job, shot, denoise)
+                    shade(job, shot, way)
                     images[shot.camera] = draw(Path(place))
             for shot in scene.shots * job.repeats:
                 with recorder.lap("labels"):
                     aim(shot, job.size[0])
                     paint(flat)
-                    if denoise:
-                        ids = all_ids(objects, Path(place))
-                    else:
-                        ids = masks(shot, objects, Path(place))
+                    make = partial(masks, shot) if way.masks else all_ids
+                    ids = make(objects, Path(place))
                 recorder.keep(scene, shot, images[shot.camera], ids)
     recorder.save()
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])
+    main(Path(sys.argv[1]), Path(sys.argv[2]), WAYS[sys.argv[3]])

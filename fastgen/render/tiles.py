@@ -96,8 +96,9 @@ class Tiles:
         for (x0, y0), (x1, y1), points in zip(
             first.tolist(), np.maximum(first, last).tolist(), hulls, strict=True
         ):
-            seen = x0 < x1 and y0 < y1
-            hull = cv2.convexHull(points.astype(np.float32))[:, 0] if seen else None
+            hull = None
+            if x0 < x1 and y0 < y1:
+                hull = cv2.convexHull(points.astype(np.float32))[:, 0].astype(np.float64)
             yield (slice(y0, y1), slice(x0, x1)), hull
 
     def _beyond(self, hull: Array, part: tuple[slice, slice]) -> Array:
