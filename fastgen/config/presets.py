@@ -66,6 +66,8 @@ _OUTDOORS: dict[str, Any] = {
     "damage": {
         "kinds": ["axis", "concave", "dented", "perforation", "scrape"],
         "faces": ["front", "back", "door", "no_door", "roof"],
+        # damages that no camera sees only cost time
+        "toward_cameras": 1.0,
     },
     "surface": {"color_weights": _FLEET_PAINT},
     "sensor": {
