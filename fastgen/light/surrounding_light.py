@@ -224,11 +224,14 @@ class _Faces(NamedTuple):
 def _covered(points: Array, toward: Array, faces: Sequence[_Faces]) -> Array:
     """Return the form factors [B, 6, P] of the faces of boxes at points with normals [P, 3]."""
     found = np.zeros((len(faces), 6, len(points)))
-    for factor, each in zip(found, faces, strict=True):
-        height = points @ each.normals.T - (each.middles * each.normals).sum(axis=1)
-        at, side = np.nonzero(height > 0)  # before a face
-        vectors = form_factors((each.corners[side] - points[at, None]).transpose(2, 1, 0))
-        factor[side, at] = np.maximum((vectors * toward[at].T).sum(axis=0), 0.0)
+    if not faces:
+        return found
+    corners, normals, middles = (np.concatenate(parts) for parts in zip(*faces, strict=True))
+    height = points @ normals.T - (middles * normals).sum(axis=1)
+    at, face = np.nonzero(height > 0)  # before a face
+    # all boxes at once, because NumPy is slow for few points
+    vectors = form_factors((corners[face] - points[at, None]).transpose(2, 1, 0))
+    found.reshape(-1, len(points))[face, at] = np.maximum((vectors * toward[at].T).sum(axis=0), 0.0)
     found *= np.minimum(1.0, _MOST_HIDDEN / np.maximum(found.sum(axis=(0, 1)), 1e-9))
     return found
 
@@ -241,10 +244,8 @@ def _sky_behind(points: Array, covered: Array, faces: Sequence[_Faces], sky: Sky
     middles = np.array([each.middles for each in faces])
     behind = hidden_sky(sky.light, middles[box, side] - points[at], sky.yaw_deg)
     factor = covered[box, side, at]
-    sums = [np.bincount(at, factor * part, len(points)) for part in behind.T]
-    whole = np.maximum(covered.sum(axis=(0, 1)), 1e-9)
-    found: Array = np.stack(sums, axis=1) / whole[:, None]
-    return found
+    whole: Array = np.maximum(covered.sum(axis=(0, 1)), 1e-9)[:, None]
+    return _sums(factor[:, None] * behind, at, len(points)) / whole
 
 
 def _face_radiance(
@@ -267,13 +268,12 @@ def _from_lights(
     points: Array, normals: Array, boxes: Sequence[OrientedBox], light: Ambient, yaw_deg: float
 ) -> Array:
     """Return irradiance / pi [P, 3] from directional lights that no box hides."""
-    found = np.zeros((len(points), 3))
-    for each in light.lights:
-        toward = to_map_frame(each.direction, -yaw_deg)
-        lit = np.maximum(normals @ toward, 0.0)
-        for box in boxes:
-            lit = lit * ~_meets(points, toward[None], box)[:, 0]
-        found += lit[:, None] * np.array(each.light)
+    if not light.lights:
+        return np.zeros((len(points), 3))
+    toward = np.array([to_map_frame(each.direction, -yaw_deg) for each in light.lights])
+    lit = np.maximum(normals @ toward.T, 0.0)
+    lit *= ~_met(points, toward, boxes)
+    found: Array = lit @ np.array([each.light for each in light.lights])
     return found
 
 
@@ -315,27 +315,29 @@ def _from_ground(
     for other, box in enumerate(boxes):
         if other != number:
             seen = seen & ~box.between(points, ends)
-    share, found = np.zeros(len(points)), np.zeros((len(points), 3))
-    mirrored = np.zeros((len(points), 4))
-    for near, reached, shown in zip(quantile.mean(axis=(1, 2)), away, seen, strict=True):
-        part = shown.mean(axis=0)
-        some = np.flatnonzero(part)
-        middle = (reached * shown).sum(axis=0)[some] / shown.sum(axis=0)[some]
-        at = points[some] + middle[:, None] * level[some]
-        at[:, 2] = paving.height_mm + _LIFT_MM
-        normals = np.broadcast_to(up, at.shape)
-        covered = _covered(at, normals, faces)
-        hidden = covered.sum(axis=(0, 1))
-        whole = sky_irradiance(light, normals, yaw_deg)
-        left = whole - hidden[:, None] * _sky_behind(at, covered, faces, sky)
-        lit = left_of_sky(whole, left, 1 - hidden[:, None])
-        lit = lit + _from_lights(at, normals, boxes, light, yaw_deg)
-        weight = part[some] * lower[some] / _GROUND_POINTS
-        share[some] += weight
-        found[some] += weight[:, None] * lit
-        mirrored[some] += near * weight[:, None] * np.insert(lit, 3, 1.0, axis=1)
+    parts = seen.mean(axis=1)
+    group, some = np.nonzero(parts)
+    middle = (away * seen).sum(axis=1)[group, some] / seen.sum(axis=1)[group, some]
+    at = points[some] + middle[:, None] * level[some]
+    at[:, 2] = paving.height_mm + _LIFT_MM
+    normals = np.broadcast_to(up, at.shape)
+    covered = _covered(at, normals, faces)
+    hidden = covered.sum(axis=(0, 1))[:, None]
+    whole = sky_irradiance(light, up[None], yaw_deg)
+    left = whole - hidden * _sky_behind(at, covered, faces, sky)
+    lit = left_of_sky(whole, left, 1 - hidden) + _from_lights(at, normals, boxes, light, yaw_deg)
+    weight = parts[group, some] * lower[some] / _GROUND_POINTS
+    share = _sums(weight[:, None], some, len(points))[:, 0]
+    found = _sums(weight[:, None] * lit, some, len(points))
+    near = quantile.mean(axis=(1, 2))[group] * weight
+    mirrored = _sums(near[:, None] * np.insert(lit, 3, 1.0, axis=1), some, len(points))
     mirrored[:, :3] *= paving.albedo
     return share, found * np.array(paving.albedo), mirrored
+
+
+def _sums(values: Array, at: NDArray[np.intp], count: int) -> Array:
+    """Return the sums [count, C] of the values [K, C] of each of `count` places, given by `at`."""
+    return np.stack([np.bincount(at, channel, count) for channel in values.T], axis=1)
 
 
 def _mean_by_side(weighted: Array, normals: Array) -> NDArray[np.float32]:
@@ -347,14 +349,25 @@ def _mean_by_side(weighted: Array, normals: Array) -> NDArray[np.float32]:
 
 def _open_bits(points: Array, box: OrientedBox, others: Sequence[OrientedBox]) -> NDArray[np.uint8]:
     """Return the directions, in the frame of a box, that no other box hides; packed, [P, D / 8]."""
-    directions = sky_directions()
-    hidden = np.zeros((len(points), len(directions)), bool)
-    for other in others:
-        hidden |= _meets(points, directions @ box.rotation.T, other)
-    return np.packbits(~hidden, axis=1)
+    return np.packbits(~_met(points, sky_directions() @ box.rotation.T, others), axis=1)
 
 
-def _meets(points: Array, toward: Array, box: OrientedBox) -> NDArray[np.bool_]:
-    """Return whether rays from P points in D directions meet a box, bool [P, D]."""
-    enters, leaves = box.crossed(points[:, None], toward[None])
-    return np.asarray(np.maximum(enters, 0.0) < leaves)
+def _met(points: Array, toward: Array, boxes: Sequence[OrientedBox]) -> NDArray[np.bool_]:
+    """Return whether rays from P points in D directions meet any of several boxes, bool [P, D]."""
+    if not boxes:
+        return np.zeros((len(points), len(toward)), bool)
+    # all boxes at once, because NumPy is slow for few points
+    turns = np.array([box.rotation for box in boxes])
+    starts = ((points - np.array([[box.center_mm] for box in boxes])) @ turns).astype(np.float32)
+    ways = toward @ turns
+    inverses = (1 / np.where(np.abs(ways) < 1e-9, 1e-9, ways)).astype(np.float32)
+    halves = np.array([box.half_mm for box in boxes], np.float32)
+    shape = len(boxes), len(points), len(toward)
+    enters, leaves = np.zeros(shape, np.float32), np.full(shape, np.inf, np.float32)
+    for axis in range(3):
+        inverse = inverses[:, None, :, axis]
+        middle = -starts[:, :, None, axis] * inverse
+        reach = halves[:, None, None, axis] * np.abs(inverse)
+        np.maximum(enters, middle - reach, out=enters)
+        np.minimum(leaves, middle + reach, out=leaves)
+    return np.asarray((enters < leaves).any(axis=0))
