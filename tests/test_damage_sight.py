@@ -10,9 +10,9 @@ from tests.plain import FEW_DECALS
 LENGTHS = np.linspace(0, 1, 400, endpoint=False)
 
 
-def scenes_of(preset, share, count):
+def scenes_of(preset, share, count, **damage):
     values = {
-        "damage": {"probability": 1, "toward_cameras": share},
+        "damage": {"probability": 1, "toward_cameras": share, **damage},
         "placement": {"damaged": 1},
         "markings": FEW_DECALS,
     }
@@ -38,7 +38,7 @@ def inside(points, kind, position, turn):
     return bool((np.abs(local) < half - 20).all(axis=1).any())
 
 
-def shown(scene):
+def shown(scene, least_px=0.75 * 1e-3 * 640 * 640):
     """Return for each damage whether a camera shows its middle, not too grazing, and large enough.
 
     The limits are 2 degrees and a quarter wider than those of the sampler, which takes the damage
@@ -56,7 +56,7 @@ def shown(scene):
                 any(
                     free_line(camera, points[0], bodies)
                     and degrees_from(camera, points[0], turn @ outward) < 77
-                    and pixels_of(camera, points[1:]) > 0.75 * 1e-3 * 640 * 640
+                    and pixels_of(camera, points[1:]) > least_px
                     for camera in scene.cameras
                 )
             )
@@ -132,3 +132,20 @@ def test_the_share_changes_only_the_damages_that_it_moves():
     assert all(one.kind == other.kind for one, other in pairs)
     same = sum(one == other for one, other in pairs)
     assert 0.5 * len(pairs) < same < len(pairs)
+
+
+def test_damages_that_are_small_in_all_images_are_drawn_where_cameras_see_them():
+    """Holes of 30 mm cover less than 0.1 % of the images of gate."""
+    small = {
+        "kinds": ["perforation"],
+        "perforation": {"torn": 0, "diameter_mm": 30, "rim_mm": 5, "depth_mm": 5},
+    }
+    toward, anywhere = (scenes_of("gate", share, 12, **small) for share in (1.0, 0.0))
+    assert not any(any(shown(scene)) for scene in toward)
+    seen, before = (
+        [flag for scene in scenes for flag in shown(scene, 0.0)[: len(scene.damages)]]
+        for scenes in (toward, anywhere)
+    )
+    assert len(seen) > 20
+    assert np.mean(seen) > 0.95
+    assert np.mean(before) < 0.85

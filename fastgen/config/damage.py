@@ -33,8 +33,9 @@ class _Frequencies:
             the door. The extents below are cut to the size of the face.
         toward_cameras: Share of the damages that are drawn again until a camera shows them: their
             middle is in its image and not behind another container, and their sheet is turned to it
-            by at most 75 degrees and covers at least 0.1 % of the image. After 30 draws the last
-            one stays. 0 places all damages regardless of the cameras, as the paper does.
+            by at most 75 degrees and covers at least 0.1 % of the image. After 30 draws the largest
+            one in an image stays. 0 places all damages regardless of the cameras, as the paper
+            does.
         mask_threshold_mm: Displacement above which a pixel belongs to the mask of a damage. The
             mask of a kind without displacement, such as `scrape`, covers the area that it marks and
             no other damage moves.

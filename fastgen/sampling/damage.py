@@ -4,11 +4,13 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 
 import numpy as np
 
 from fastgen.config.damage import DamageConfig
 from fastgen.damages.draws import FRAME_MM, rounded_vector, turned
+from fastgen.sampling.sight import LEAST_SHARE
 from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import Damage, Vec3
 from fastgen.scene.damage_kinds import Kind, SheetForm, kind_named
@@ -52,7 +54,7 @@ def sample_damages(
     config: DamageConfig,
     size_mm: Vec3,
     streams: Streams,
-    seen: Callable[[Damage], bool],
+    share: Callable[[Damage], float],
 ) -> tuple[Damage, ...]:
     """Sample the damages of one container.
 
@@ -60,7 +62,7 @@ def sample_damages(
         config: Probabilities and ranges.
         size_mm: Outer length, width and height of the container.
         streams: Function from the name of a property to its independent random generator.
-        seen: Function from a damage to whether a camera shows it.
+        share: Function from a damage to the part of an image that it covers, see DamageSight.share.
 
     Returns:
         Damages in the container frame, those of listed_kinds first; an empty tuple for an
@@ -73,10 +75,8 @@ def sample_damages(
     for i, kind in enumerate(map(kind_named, kinds)):
         rng = streams(f"damage.{i}")
         aimed = streams(f"damage.{i}.toward").random() < config.toward_cameras
-        for _ in range(_MOST_DRAWS):
-            damage = _drawn(kind, config, size_mm, planes, rng)
-            if not aimed or seen(damage):
-                break
+        draw = partial(_drawn, kind, config, size_mm, planes, rng)
+        damage = _best_seen(draw, share) if aimed else draw()
         bars = damaged_bars((*damages, damage))
         if len(bars) > len(set(bars)):
             continue
@@ -89,6 +89,20 @@ def sample_damages(
         if scraped and rng.random() < config.ranges_of("scrape").beside and room:
             beside.append(_beside(damage, config, planes[damage.face], rng))
     return (*damages, *beside)
+
+
+def _best_seen(draw: Callable[[], Damage], share: Callable[[Damage], float]) -> Damage:
+    """Return the first of _MOST_DRAWS damages that is large enough in an image, or the largest."""
+    damage = draw()
+    largest = share(damage)
+    for _ in range(_MOST_DRAWS - 1):
+        if largest >= LEAST_SHARE:
+            break
+        other = draw()
+        covered = share(other)
+        if covered > largest:
+            damage, largest = other, covered
+    return damage
 
 
 def _drawn(

@@ -107,8 +107,8 @@ def sample_neighbours(
         own = streams_of(site, streams)
         alike = own("same_paint").random() < config.placement.same_paint
         color = first.surface.paint.name if alike else None
-        seen = partial(sight.shows, body)
-        contents = sample_contents(theirs, site.kind, own, seen, color)
+        share = partial(sight.share, body)
+        contents = sample_contents(theirs, site.kind, own, share, color)
         return Neighbour(site.pose, **contents._asdict())
 
     return tuple(itertools.starmap(neighbour, enumerate(sites, start=1)))

@@ -90,7 +90,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
     around = sample_surroundings(config, kind, spreader.present, cameras, streams)
     bodies = [(kind, Pose()), *((site.kind, site.pose) for site in around.sites)]
     sight = DamageSight(around.cameras, bodies)
-    first = sample_contents(config, kind, streams, partial(sight.shows, 0))
+    first = sample_contents(config, kind, streams, partial(sight.share, 0))
     # a spreader of this kind holds one container
     spreader = replace(spreader, present=spreader.present and not around.twins)
     ground = None

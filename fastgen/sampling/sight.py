@@ -18,8 +18,8 @@ _STEPS = 8
 _LEAST_TURN = float(np.cos(np.deg2rad(75)))
 """Least cosine between a damage's outward axis and the way to a camera that shows it."""
 
-_LEAST_SHARE = 1e-3
-"""Least part of the image that a shown damage covers: 410 pixels of 640x640."""
+LEAST_SHARE = 1e-3
+"""Part of an image that a damage should cover: 410 pixels of 640x640."""
 
 Array = NDArray[np.float64]
 
@@ -80,8 +80,11 @@ class DamageSight:
     def _boxes(self) -> list[OrientedBox]:
         return [container_box(kind, pose) for kind, pose in self._bodies]
 
-    def shows(self, body: int, damage: Damage) -> bool:
-        """Return whether a camera shows a damage as described at `DamageConfig.toward_cameras`.
+    def share(self, body: int, damage: Damage) -> float:
+        """Return the part of an image that a damage covers, 0 to 1, from LEAST_SHARE on at least.
+
+        It is the largest among the cameras that show it as described at
+        `DamageConfig.toward_cameras`; 0 if none does.
 
         Args:
             body: Index of its container.
@@ -97,12 +100,16 @@ class DamageSight:
         )
         points = middle + np.array([0 * along, -along, along, -across, across])
         others = [box for i, box in enumerate(self._boxes) if i != body]
-        return any(
-            _turned_to(view, middle, outward)
-            and _large_in(view, points)
-            and not any(box.between(view.position_m / MM, middle) for box in others)
-            for view in self._views
-        )
+        largest = 0.0
+        for view in self._views:
+            share = _covered(view, points) if _turned_to(view, middle, outward) else 0.0
+            if share > largest and not any(
+                box.between(view.position_m / MM, middle) for box in others
+            ):
+                largest = share
+                if largest >= LEAST_SHARE:
+                    break
+        return largest
 
 
 def _turned_to(view: View, middle: Array, outward: Array) -> bool:
@@ -111,8 +118,8 @@ def _turned_to(view: View, middle: Array, outward: Array) -> bool:
     return bool(way @ outward >= _LEAST_TURN * np.linalg.norm(way))
 
 
-def _large_in(view: View, points: Array) -> bool:
-    """Return whether the image contains a rectangle's middle, and enough of it would be covered.
+def _covered(view: View, points: Array) -> float:
+    """Return the part of an image that a rectangle covers; 0 if its middle is outside.
 
     Args:
         view: View with an image of one pixel.
@@ -120,9 +127,9 @@ def _large_in(view: View, points: Array) -> bool:
     """
     (middle, *sides), depth = view.project(points)
     if depth.min() <= 0 or middle.min() < 0 or middle.max() > 1:
-        return False
+        return 0.0
     (x1, y1), (x2, y2) = sides[1] - sides[0], sides[3] - sides[2]
-    return bool(abs(x1 * y2 - x2 * y1) >= _LEAST_SHARE)
+    return float(abs(x1 * y2 - x2 * y1))
 
 
 def _points_toward(box: OrientedBox, eye: Array) -> tuple[Array, Array]:
