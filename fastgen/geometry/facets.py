@@ -3,7 +3,6 @@
 Sutherland and Hodgman 1974, "Reentrant Polygon Clipping".
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import TypeVar
@@ -12,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.geometry.damage_law import corners_mm, deform
-from fastgen.geometry.distinct_rows import distinct_rows
 from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Damage, Scene
 
@@ -87,11 +85,11 @@ def damage_facets(scene: Scene, mesh: Mesh, damage: Damage) -> Facets:
     return Facets(moved, np.zeros(len(rest), np.int64), corners.reshape(-1, 3), rest)
 
 
-def mesh_facets(mesh: Mesh, damages: Sequence[Damage] = ()) -> Facets:
-    """Return all triangles of a mesh after damage, with each point once."""
-    first, which = distinct_rows(mesh.positions_mm)
-    points = deform(tuple(damages), mesh.positions_mm.take(first, axis=0))
-    return Facets(points, np.zeros(len(points), np.int64), which.take(mesh.triangles))
+def mesh_facets(mesh: Mesh) -> Facets:
+    """Return all triangles of a mesh, with each point of mesh.points_mm once."""
+    _, which = mesh.distinct
+    owner = np.zeros(len(mesh.points_mm), np.int64)
+    return Facets(mesh.points_mm, owner, which.take(mesh.triangles))
 
 
 def in_fours(facets: Facets) -> Facets:

@@ -265,8 +265,13 @@ class Mesh:
     @cached_property
     def points_mm(self) -> NDArray[np.float64]:
         """Distinct positions [P, 3] of the vertices."""
-        first, _ = distinct_rows(self.positions_mm)
+        first, _ = self.distinct
         return self.positions_mm[first].astype(np.float64)
+
+    @cached_property
+    def distinct(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Indices [P] of a vertex at each of points_mm, and the point [V] of each vertex."""
+        return distinct_rows(self.positions_mm)
 
     @cached_property
     def hull(self) -> NDArray[np.int64]:

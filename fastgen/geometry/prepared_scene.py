@@ -196,7 +196,7 @@ class PreparedScene:
     @cached_property
     def facets(self) -> Facets:
         """All triangles of the container after damage, in the container frame."""
-        return mesh_facets(self.container, self.scene.damages)
+        return replace(mesh_facets(self.container), points_mm=self.points_mm)
 
     @cached_property
     def corners_mm(self) -> Array:
