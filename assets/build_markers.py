@@ -4,8 +4,9 @@
 
 Run by hand. A marker is a square standing on its corner, inscribed in 1000 x 1000. Class, symbol and
 colours come from `marker_families.py`. Wording, weight of the digit, inner line, rim and inks are
-distributed alike over all classes, so only field, symbol and digit tell a class. All are original
-drawings after the rules, which leave these choices to the printer.
+distributed alike over all fields, and are the same for classes with equal fields, so only field,
+symbol and digit tell a class. All are original drawings after the rules, which leave these choices
+to the printer.
 """
 
 import json
@@ -19,7 +20,7 @@ from marker_fittings import FITTINGS
 WORDINGS = ("none", "line", "un", "two", "side", "fine")
 """Wordings of all prints except the first of a class, which is "heavy"."""
 
-DIGITS = (175, 150, 175, 95, 160)
+DIGITS = (175, 150, 175, 160, 95)
 """Heights of the class digit's capitals; most are heavy."""
 
 RIMS = (0, 26, 0, 44)
@@ -52,16 +53,21 @@ class Look:
     pick: int
 
 
-def looks(class_number: int, count: int) -> list[Look]:
-    """Return the looks of a class: a Latin square, so that choices are independent of the class."""
+def looks(number: int, count: int) -> list[Look]:
+    """Return the looks of a class: a Latin square, so that choices are independent of the field.
+
+    Args:
+        number: Number of the field.
+        count: Number of prints of the class.
+    """
     return [
         Look(
-            WORDINGS[(v + 4 * class_number + class_number // 3) % len(WORDINGS)] if v else "heavy",
-            DIGITS[(2 * v + class_number) % len(DIGITS)],
-            RIMS[(v + 3 * class_number + v // 4) % len(RIMS)],
-            INNER_LINES[(v + 3 * class_number) % len(INNER_LINES)],
-            (v + class_number) % 3,
-            (v + class_number // 3) % len(FONTS),
+            WORDINGS[(v + 4 * number + number // 3) % len(WORDINGS)] if v else "heavy",
+            DIGITS[(2 * v + number) % len(DIGITS)],
+            RIMS[(v + 3 * number + v // 4) % len(RIMS)],
+            INNER_LINES[(v + 3 * number) % len(INNER_LINES)],
+            (v + number) % 3,
+            (v + number // 3) % len(FONTS),
             v,
         )
         for v in range(count)
@@ -336,10 +342,15 @@ class Print:
 
 def all_looks() -> dict[str, tuple[str, Look]]:
     """Return class and look of every print by name. The first of a class has the class's name."""
+    fields = {
+        name: (each.field, each.ink, each.second, each.second_shape)
+        for name, each in FAMILIES.items()
+    }
+    numbers = list(dict.fromkeys(fields.values()))
     return {
         class_name if look.pick == 0 else f"{class_name}.{look.pick}": (class_name, look)
-        for number, class_name in enumerate(FAMILIES)
-        for look in looks(number, 6 if class_name in COMMON else 4)
+        for class_name, field in fields.items()
+        for look in looks(numbers.index(field), 6 if class_name in COMMON else 4)
     }
 
 

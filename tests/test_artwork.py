@@ -160,6 +160,17 @@ def test_wordings_do_not_tell_the_class():
     assert all(len(names) >= len(MARKER_CLASSES) / 2 for names in classes.values()), classes
 
 
+@pytest.mark.parametrize(
+    "pair", [("C2.1", "C3.1"), ("C2.2", "C3.2"), ("C2.5", "C6.1"), ("C7.2", "C7.4")]
+)
+def test_classes_with_equal_fields_have_the_same_prints_above_the_words(pair):
+    """Otherwise a rim, a line or an ink would tell a class from one that looks like it."""
+    first, second = (marker_prints()[name] for name in pair)
+    layers, top = art_layers(), int(0.3 * ART_SIZE)
+    for one, other in zip(first, second, strict=True):
+        assert np.array_equal(*(IMAGES[layers[art], :top] for art in (one, other)))
+
+
 def test_prints_with_a_un_number_have_a_white_band_with_dark_digits():
     index = json.loads(asset_path("markers", "index.json").read_text(encoding="utf-8"))
     images, layers = IMAGES, art_layers()
