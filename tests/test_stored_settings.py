@@ -19,7 +19,6 @@ from fastgen.torch import (
     SceneSettings,
 )
 
-
 # Panoramas that version 0.23 lacked.
 ADDED = {
     *("port_gate", "port_gate_rain", "port_aisle", "port_aisle_fog", "port_rail", "port_rail_rain"),
