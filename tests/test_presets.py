@@ -72,7 +72,11 @@ def test_a_gate_has_no_spreader_and_every_preset_has_containers(scenes):
 
 
 def test_containers_without_markers_have_the_same_other_properties(scenes):
-    damage = {"kinds": list(DAMAGE_CLASSES), "faces": ["front", "back", "door", "no_door"]}
+    damage = {
+        "kinds": list(DAMAGE_CLASSES),
+        "faces": ["front", "back", "door", "no_door"],
+        "toward_cameras": 0,
+    }
     fewer = {"placement": {"neighbours": 0}, "damage": damage}
     gate = Generator(Config.from_values(fewer, Config.preset("gate")), seed=6)
     for marked, plain in zip(scenes["seafront"][:40], map(gate.scene, range(40)), strict=True):
