@@ -32,8 +32,8 @@ _SKIN_MM = 150.0
 """Depth below its outer box from which an undamaged container hides what is behind it."""
 
 _LEAST_AWAY_MM = 5 * NEAR_M / MM
-"""Distance to the camera from which no part of a container is in front of the near plane; rays are
-at most 78 degrees off the axis."""
+"""Distance of a container to the camera from which the near plane cuts off no visible part of it;
+rays are at most 78 degrees off the axis."""
 
 _BOX_COUNTS = (0, 1, 2, 4, 8, MAX_BOXES)
 """Numbers of containers that programs are compiled for."""

@@ -81,10 +81,10 @@ class DamageSight:
         return [container_box(kind, pose) for kind, pose in self._bodies]
 
     def share(self, body: int, damage: Damage) -> float:
-        """Return the part of an image that a damage covers, 0 to 1, from LEAST_SHARE on at least.
+        """Return the largest part of an image that a damage covers, or one of LEAST_SHARE or more.
 
-        It is the largest among the cameras that show it as described at
-        `DamageConfig.toward_cameras`; 0 if none does.
+        Only cameras that show it as described at `DamageConfig.toward_cameras` count; 0 if none
+        does.
 
         Args:
             body: Index of its container.
