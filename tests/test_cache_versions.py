@@ -13,7 +13,7 @@ from fastgen.render import noise, rust, sky_visibility_probe
 from fastgen.render.gl import open_context
 
 TABLE = {
-    "art": (artwork, 6, 18.11144, 41.92986, 36.3485),
+    "art": (artwork, 7, 18.11144, 41.93788, 36.35176),
     "container": (container, 9, 12.77836, 33.3579, 30.57862),
     "container-map": (container_map, 1, 14.74129, 12.30284, 4.79345),
     "dfg": (reflectance, 1, 7.62462, 0.34701, 0.17011),

@@ -18,7 +18,7 @@ from fastgen.files import disk_cache
 from fastgen.resources import asset_path
 from fastgen.srgb import DECODED, ENCODED
 
-VERSION = 6  # raise when the stored arrays change
+VERSION = 7  # raise when the stored arrays change
 
 ART_SIZE = 256
 """Width and height of an artwork image, texels."""
