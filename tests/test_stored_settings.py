@@ -32,9 +32,8 @@ def digest(state):
 def with_floats(value):
     """Turn all numbers into floats, as one state may have 12 and the other 12.0.
 
-    The configuration, its class lists, the digests of a curriculum's configurations and those of
-    container maps, and the panoramas of later versions are dropped; version 0.23 lacked some of
-    them.
+    Keys that version 0.23 lacked, or that depend on the configuration, are dropped: configuration,
+    class lists, digests of a curriculum and of container maps, and later panoramas.
     """
     if isinstance(value, dict):
         dropped = {"config", "classes", "curriculum", "containers", *ADDED}
