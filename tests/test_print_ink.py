@@ -21,8 +21,8 @@ SIDE, SCALE = 28, 16
 DISTANCE_MM = 20000.0
 QUALITIES = ("draft", "balanced", "fine")
 TOLERANCE = 0.05
-TINY_TOLERANCE = 0.08
-"""Prints of half a pixel: the lookups of `fine` miss up to 6.5 % of them."""
+STRIPES_TOLERANCE = 0.07
+"""The lookups of `fine` miss up to 6.5 % of striped prints of half a pixel."""
 COLUMN_TOLERANCE = 0.1
 """A column of letters lies on one fold of the sheet, which moves its letters within a pixel."""
 
@@ -103,8 +103,9 @@ def test_prints_keep_their_ink(name, size_px, plain, generators):
         assert wanted > 0.02
         for quality in QUALITIES:
             found = ink(generators, quality, plain, (decal,), camera)
-            most = TOLERANCE if size_px >= 1 else TINY_TOLERANCE
-            most = COLUMN_TOLERANCE if name == "column" else most
+            most = COLUMN_TOLERANCE if name == "column" else TOLERANCE
+            if (name, size_px, quality) == ("striped marker", 0.5, "fine"):
+                most = STRIPES_TOLERANCE
             assert found == pytest.approx(wanted, rel=most), quality
 
 
