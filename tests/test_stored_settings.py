@@ -20,9 +20,9 @@ from fastgen.torch import (
 )
 
 # Panoramas that version 0.23 lacked.
-ADDED = {
-    *("port_gate", "port_gate_rain", "port_aisle", "port_aisle_fog", "port_rail", "port_rail_rain"),
-}
+ADDED = [
+    f"port_{place}" for place in ("gate", "gate_rain", "aisle", "aisle_fog", "rail", "rail_rain")
+]
 
 
 def digest(state):

@@ -6,7 +6,6 @@ The number of samples is part of the job.
 import sys
 import tempfile
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import bpy
@@ -26,7 +25,8 @@ class Way:
         denoise: Add Open Image Denoise to the colour image.
         noise: Noise threshold at which a pixel gets no more samples; 0 for the same number of
             samples in all pixels.
-        bounces: Most bounces of light, in all (max) and by kind of surface.
+        bounces: Most bounces of light, in all (max) and by kind of surface; Blender's defaults for
+            kinds that are not listed.
         masks: Make a binary render for each visible marker, not one flat render of all ids.
     """
 
@@ -45,7 +45,7 @@ WAYS = {
         noise=0.01, bounces={"max": 3, "diffuse": 3, "glossy": 0, "transmission": 0}
     ),
     # kubric/renderer/blender.py; the threshold and the bounces are Blender's defaults
-    "kubric": Way(noise=0.01, bounces={"max": 12, "diffuse": 4, "glossy": 4, "transmission": 12}),
+    "kubric": Way(noise=0.01),
 }
 """Ways by name. One flat render of all ids is the fastest way to get labels from Cycles, and also
 BlenderProc's own. Kubric reads labels from a Cryptomatte pass of the colour image instead."""
@@ -188,8 +188,10 @@ def main(folder: Path, out: Path, way: Way) -> None:
                 with recorder.lap("labels"):
                     aim(shot, job.size[0])
                     paint(flat)
-                    make = partial(masks, shot) if way.masks else all_ids
-                    ids = make(objects, Path(place))
+                    if way.masks:
+                        ids = masks(shot, objects, Path(place))
+                    else:
+                        ids = all_ids(objects, Path(place))
                 recorder.keep(scene, shot, images[shot.camera], ids)
     recorder.save()
 

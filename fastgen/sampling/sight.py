@@ -81,7 +81,7 @@ class DamageSight:
         return [container_box(kind, pose) for kind, pose in self._bodies]
 
     def share(self, body: int, damage: Damage) -> float:
-        """Return the largest part of an image that a damage covers, or one of LEAST_SHARE or more.
+        """Return the largest part of an image that a damage covers.
 
         Only cameras that show it as described at `DamageConfig.toward_cameras` count; 0 if none
         does.
@@ -100,16 +100,16 @@ class DamageSight:
         )
         points = middle + np.array([0 * along, -along, along, -across, across])
         others = [box for i, box in enumerate(self._boxes) if i != body]
-        largest = 0.0
-        for view in self._views:
-            share = _covered(view, points) if _turned_to(view, middle, outward) else 0.0
-            if share > largest and not any(
-                box.between(view.position_m / MM, middle) for box in others
-            ):
-                largest = share
-                if largest >= LEAST_SHARE:
-                    break
-        return largest
+        return max(
+            (
+                share
+                for view in self._views
+                if _turned_to(view, middle, outward)
+                and (share := _covered(view, points))
+                and not any(box.between(view.position_m / MM, middle) for box in others)
+            ),
+            default=0.0,
+        )
 
 
 def _turned_to(view: View, middle: Array, outward: Array) -> bool:
