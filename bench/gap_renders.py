@@ -80,7 +80,7 @@ class Renders:
     @cached_property
     def texts(self) -> list[Text]:
         """Held-out identifiers as the preset's own cameras see them."""
-        scenes = range(HELD_OUT, HELD_OUT + self._effort.held_out // 4)
+        scenes = range(HELD_OUT, HELD_OUT + self._effort.held_out)
         return default_texts(self._seed, scenes, self._workers)
 
     def _rendered_views(self, preset: str) -> list[View]:

@@ -1,5 +1,6 @@
 """Layouts of identifiers, their parts in images, and their clearance from door gear."""
 
+import itertools
 from collections import Counter
 from dataclasses import replace
 
@@ -57,8 +58,8 @@ def test_parts_of_a_layout_never_overlap_and_fill_the_decal():
     for font in glyph_tiles()[1].values():
         for kind in LAYOUTS:
             for place in TYPE_PLACES[kind]:
-                for boxed in (False, True):
-                    form = Form(kind, place, 100.0, boxed, 60.0, 25.0, 50.0)
+                for boxed, pitch in itertools.product((False, True), (0.0, 139.0)):
+                    form = Form(kind, place, 100.0, boxed, 60.0, 25.0, 50.0, pitch)
                     parts = identifier_parts(identifier, form, font)
                     made = layout((), font, 100.0, parts=parts)
                     rects = np.array([box[2:] for box in made.parts])

@@ -166,6 +166,25 @@ def test_columns_on_the_end_wall_stand_on_outer_flats(scenes):
                 assert min(abs(column - m) for m in middles) < 0.2
 
 
+def test_letters_of_rows_and_blocks_on_the_end_wall_stand_on_flats(scenes):
+    checked = 0
+    for scene in scenes:
+        wave = scene.container.profiles.end
+        half_wave = (wave.outer_mm + wave.inner_mm) / 2 + math.hypot(wave.slope_mm, wave.depth_mm)
+        mesh = build_container(scene.container.kind, scene.container.profiles)
+        outer = sum(mesh.flats["no_door"][0]) / 2
+        for decal in scene.decals:
+            if decal.vertical or decal.face != "no_door" or decal.class_name != "text":
+                continue
+            left = decal.center_mm[0] - decal.size_mm[0] / 2
+            for glyph in decal.lettering.glyphs:
+                letter = left + (glyph.x0 + glyph.x1) / 2
+                away = (letter - outer + half_wave / 2) % half_wave - half_wave / 2
+                assert abs(away) < 1.0  # lengths of decals are rounded to 0.1 mm
+                checked += 1
+    assert checked > 100
+
+
 def test_letters_are_at_least_as_high_as_the_standard_requires(scenes):
     for scene in scenes:
         for decal in scene.decals:

@@ -23,8 +23,8 @@ class IdentifierConfig:
         brand_codes: Probability that a container has an owner code of its brand; not used if
             owner_codes is given. Most containers of a line are leased and have other codes.
         check_digit_box: Probability of the frame around the check digit.
-        rib_pitch: Probability that the letters of a block on a corrugated wall are spaced by half
-            waves, one on each flat.
+        rib_pitch: Probability that the letters of rows or a block on a long side are spaced by half
+            waves, one on each flat. On the end without doors, whose flanks are steep, all are.
         painted_over: Probability that a container has an older identifier under a patch of fresh
             paint, below or beside the present one. Its letters may show faintly through the paint
             and have no label.

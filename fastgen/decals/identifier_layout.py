@@ -37,8 +37,9 @@ class Form:
         owner_gap_mm: Gap between owner code and serial number.
         check_gap_mm: Gap between the serial number and the check digit or its frame.
         column_gap_mm: Gap between the columns of an upright identifier.
-        pitch_mm: Distance between the letters of a line of a block, or between the baselines of a
-            column; 0 for the usual one.
+        pitch_mm: Distance between the letters of a line, or between the baselines of a column; 0
+            for the usual one. Lines with a pitch have all their letters in columns of that pitch,
+            without the gaps above and with one free column before the serial number of rows.
     """
 
     layout: str
@@ -70,6 +71,8 @@ def identifier_parts(identifier: Identifier, form: Form, font: Font) -> tuple[Te
     Returns:
         The four parts. The lower left corner of their common box is at (0, 0).
     """
+    if form.pitch_mm and form.layout != "column":
+        return _spaced(identifier, form, font)
     place = {"rows": _rows, "block": _block, "column": _column}[form.layout]
     return place(identifier, form, font)
 
@@ -83,14 +86,9 @@ def _frame(form: Form, font: Font) -> tuple[float, float]:
     return (widest / 2 + BOX_MARGIN_CAPS) * form.cap_mm, BOX_MARGIN_CAPS * form.cap_mm
 
 
-def _width(text: str, form: Form, font: Font, pitch_mm: float = 0.0) -> float:
+def _width(text: str, form: Form, font: Font) -> float:
     """Return the width of the ink of letters without spaces in one line."""
-    if not pitch_mm:
-        return ink_width_mm(text, font, form.cap_mm)
-    ends = [
-        font.glyphs[char].ink_right - font.glyphs[char].ink_left for char in text[:: len(text) - 1]
-    ]
-    return (len(text) - 1) * pitch_mm + sum(ends) / 2 * form.cap_mm
+    return ink_width_mm(text, font, form.cap_mm)
 
 
 def row_widths(identifier: Identifier, form: Form, font: Font) -> tuple[float, float]:
@@ -130,14 +128,37 @@ def _rows(identifier: Identifier, form: Form, font: Font) -> tuple[TextPart, ...
 
 
 def _block(identifier: Identifier, form: Form, font: Font) -> tuple[TextPart, ...]:
-    step, pitch = LINE_PITCH_CAPS * form.cap_mm, form.pitch_mm
-    serial_end = _width(identifier.serial, form, font, pitch)
-    check_x = _check_x(identifier, form, font, serial_end)
+    step = LINE_PITCH_CAPS * form.cap_mm
+    check_x = _check_x(identifier, form, font, _width(identifier.serial, form, font))
     return (
-        TextPart("owner", identifier.owner, 0.0, 2 * step, pitch_mm=pitch),
-        TextPart("serial", identifier.serial, 0.0, step, pitch_mm=pitch),
+        TextPart("owner", identifier.owner, 0.0, 2 * step),
+        TextPart("serial", identifier.serial, 0.0, step),
         TextPart("check", identifier.check, check_x, step, boxed=form.boxed),
-        TextPart("type", identifier.size_type, 0.0, 0.0, pitch_mm=pitch),
+        TextPart("type", identifier.size_type, 0.0, 0.0),
+    )
+
+
+def _spaced(identifier: Identifier, form: Form, font: Font) -> tuple[TextPart, ...]:
+    step, pitch = LINE_PITCH_CAPS * form.cap_mm, form.pitch_mm
+    serial = len(identifier.owner) + 1 if form.layout == "rows" else 0
+    placed = (  # text, column of its first letter, line from below
+        ("owner", identifier.owner, 0, 1 if form.layout == "rows" else 2),
+        ("serial", identifier.serial, serial, 1),
+        ("check", identifier.check, serial + len(identifier.serial), 1),
+        ("type", identifier.size_type, serial if form.type_place == "under serial" else 0, 0),
+    )
+    halves = [_width(text[0], form, font) / 2 for _, text, _, _ in placed]
+    left = max(half for half, (_, _, column, _) in zip(halves, placed, strict=True) if not column)
+    return tuple(
+        TextPart(
+            role,
+            text,
+            left + column * pitch - half,
+            line * step,
+            pitch_mm=pitch if len(text) > 1 else 0.0,
+            boxed=role == "check" and form.boxed,
+        )
+        for half, (role, text, column, line) in zip(halves, placed, strict=True)
     )
 
 

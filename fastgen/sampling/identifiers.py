@@ -1,5 +1,6 @@
 """Sampling of identifiers (ISO 6346)."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -23,6 +24,9 @@ from fastgen.validation import Range
 _TRIES = 12
 """Positions tried for rows on both sides of a locking bar."""
 
+_FLATS = 4
+"""Flats that are tried for the first letter where letters are spaced by half waves."""
+
 _COLUMN_CAPS = 17.0
 """Height of the tallest column in cap heights."""
 
@@ -32,8 +36,9 @@ def sample_identifiers(
 ) -> list[Decal]:
     """Sample one identifier at the upper right (ISO 6346, section 7), on long sides maybe two.
 
-    The second one is at the left end. Columns on a corrugated end wall are centred on outer flats.
-    Nothing on a door is covered by its gear. If a layout finds no room, the others are tried.
+    The second one is at the left end. Letters that are spaced by half waves stand on the flats of
+    their wall, and columns on a corrugated end wall on an outer flat. Nothing on a door is covered
+    by its gear. If a layout finds no room, the others are tried.
     """
     rng = streams(f"identifier.{sheet.face}")
     long_side = sheet.face in ("front", "back")
@@ -60,12 +65,14 @@ def _forms(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generator) -> li
     boxed = bool(rng.random() < settings.check_digit_box)
     cap = config.cap_mm.lo if sheet.clearance else between(rng, config.cap_mm)
     on_ribs = sheet.face != "door" and rng.random() < settings.rib_pitch
-    made = [_form(first, cap, boxed, sheet.half_wave_mm if on_ribs else 0.0, rng)]
+    steep = sheet.face == "no_door"  # a stem on one of its flanks could hardly be seen
+    pitch = sheet.half_wave_mm if (on_ribs or steep) and sheet.face != "roof" else 0.0
+    made = [_form(first, cap, boxed, pitch, rng)]
     others = [name for name in LAYOUTS if name != first]
     if sheet.face == "roof":
         others.remove("column")
     for name in (first, *others):
-        made.append(_form(name, config.cap_mm.lo, boxed, 0.0, rng))
+        made.append(_form(name, config.cap_mm.lo, boxed, pitch if steep else 0.0, rng))
     tallest = tenth((sheet.size[1] - 2 * EDGE_MM) / _COLUMN_CAPS)
     return [
         replace(form, cap_mm=max(min(form.cap_mm, tallest), config.cap_mm.lo))
@@ -82,8 +89,10 @@ def _form(
     upright = layout == "column"
     if upright:
         pitch_mm = float(rng.uniform(GLYPH_PITCH_CAPS - 0.1, GLYPH_PITCH_CAPS + 0.1)) * cap_mm
-    elif layout == "rows" or pitch_mm < 0.8 * cap_mm:
+    elif pitch_mm < 0.8 * cap_mm:
         pitch_mm = 0.0
+    elif type_place == "same line":
+        type_place = "under serial"  # the line would be longer than most end walls
     return Form(
         layout=layout,
         type_place=type_place,
@@ -118,6 +127,8 @@ def _in_one_piece(
     center = None
     if form.layout == "column" and sheet.face == "no_door":
         center = _on_flat(sheet, lettering, rng)
+    if form.pitch_mm and form.layout != "column":
+        center = _on_flats(sheet, lettering, form.pitch_mm, number, rng)
     if not center:
         x = Range(0.86, 1.0) if number == 0 else Range(0.0, 0.12)
         x = Range(0.5, 1.0) if sheet.clearance else x
@@ -154,6 +165,25 @@ def _across_bar(
                 center = (tenth(x), tenth(y - height / 2))
                 if sheet.claim(center, lettering.size_mm, lettering.parts):
                     return placed(text, sheet, center)
+    return None
+
+
+def _on_flats(
+    sheet: Sheet, text: Lettering, pitch_mm: float, number: int, rng: np.random.Generator
+) -> Vec2 | None:
+    """Place letters with a pitch of half a wave on the flats, as far up and aside as they fit."""
+    first = (text.glyphs[0].x0 + text.glyphs[0].x1) / 2
+    flat = sum(sheet.flats[0]) / 2
+    least, most = EDGE_MM, sheet.size[0] - EDGE_MM - text.size_mm[0]
+    low = math.ceil((least + first - flat) / pitch_mm)
+    high = math.floor((most + first - flat) / pitch_mm)
+    places = range(low, high + 1)[:: 1 if number else -1]
+    room = sheet.size[1] - 2 * EDGE_MM - text.size_mm[1]
+    for place in places[:_FLATS]:
+        x = flat + place * pitch_mm - first + text.size_mm[0] / 2
+        y = EDGE_MM + text.size_mm[1] / 2 + room * rng.uniform(0.82, 1.0)
+        if sheet.claim((tenth(x), tenth(y)), text.size_mm, text.parts):
+            return tenth(x), tenth(y)
     return None
 
 
