@@ -7,7 +7,8 @@
 Run by hand. Needs Python 3.11, `bpy` 4.5, `OpenEXR` and OpenCV. The package panoramas/ contains the
 port: shapes, materials, models, layout and sky. Cycles traces the objects on the ground. Haze, sky
 and the sun's disc are added from exact maps afterwards, so that the disc keeps its energy and the
-sky has no noise. Beside each panorama, NAME.containers.png numbers the containers that it shows.
+sky has no noise. Beside each panorama, NAME.containers.png numbers the containers that it shows, and marks
+what else stands on the ground.
 
 The night of the gate and of the aisle and the dusk at the rails are not part of the package: at the
 night of the gate, denoising leaves red stains on the ground. Render them with `--out` into a folder
@@ -36,7 +37,7 @@ from panoramas.daylight import (
 )
 from panoramas.materials import build_materials
 from panoramas.port import Builder, Variant
-from panoramas.tracing import Image, add_camera, container_map, read_exr, trace
+from panoramas.tracing import OTHER, Image, add_camera, container_map, read_exr, trace
 from panoramas.variants import VARIANTS
 
 HDRI = Path(__file__).parent / "hdri"
@@ -132,7 +133,8 @@ def write_map(v: Variant, width: int, path: Path) -> None:
     done, data = cv2.imencode(".png", numbers, [cv2.IMWRITE_PNG_COMPRESSION, 9])
     assert done
     path.write_bytes(data.tobytes())
-    print(f"{path.name}: {numbers.max()} containers, {len(data)} bytes", flush=True)
+    count = numbers.max(where=numbers < OTHER, initial=0)
+    print(f"{path.name}: {count} containers, {len(data)} bytes", flush=True)
 
 
 def write_index(folder: Path) -> None:

@@ -15,7 +15,7 @@
 #include "ground_material.glsl"
 #include "ground_mirror.glsl"
 #include "ground_props.glsl"
-#include "ground_ray.glsl"
+#include "ground_seen.glsl"
 
 layout(location = 0) out vec4 out_color;
 #if !GROUND_COARSE
@@ -54,7 +54,8 @@ vec3 ground_color(vec3 at, vec3 ray, float depth) {
 // plane or a prop; infinite where the panorama replaces both.
 vec4 seen_color(vec3 ray, out float depth) {
     vec3 at;
-    depth = plane_depth(ray, at);
+    float share;
+    depth = seen_plane(ray, at, share);
 #if LAYER != LAYER_ALL
     vec3 color = vec3(LAYER == LAYER_NORMALS ? 0.5 : 1.0);
 #else
@@ -63,12 +64,14 @@ vec4 seen_color(vec3 ray, out float depth) {
     color = ground_color(at, ray, isinf(depth) ? 1.0 : depth);
 #endif
 #endif
-    float share = 1.0;
 #if GROUND_FADES && GROUND_PLANE && LAYER == LAYER_ALL
-    float away = isinf(depth) ? 1.0 : length(at.xy) / ground_reach_m;
-    share = 1.0 - smoothstep(GROUND_FADE_START, 1.0, away);
-    vec3 behind = exposure * background(ray);
-    color = share > 0.0 ? mix(behind, color, share) : behind;
+    if (isinf(depth)) share = 0.0;
+    if (share < 1.0) {
+        vec3 behind = exposure * background(ray);
+        color = share > 0.0 ? mix(behind, color, share) : behind;
+    }
+#else
+    share = 1.0;
 #endif
 #if GROUND_PROPS
     PropHit hit = first_prop(ray, depth);
@@ -103,7 +106,9 @@ void main() {
         color += seen_color(ground_ray(gl_FragCoord.xy + offset), depth) / float(samples);
     }
     vec3 at, ray = ground_ray(gl_FragCoord.xy);
-    depth = first_prop(ray, plane_depth(ray, at)).depth;
+    float share;
+    depth = seen_plane(ray, at, share);
+    depth = first_prop(ray, depth).depth;
 #else
     vec4 color = seen_color(ground_ray(gl_FragCoord.xy), depth);
 #endif

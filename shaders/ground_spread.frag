@@ -3,7 +3,7 @@
 // panorama, no labels, and the depth of each pixel.
 #version 430 core
 #include "display_color.glsl"
-#include "ground_ray.glsl"
+#include "ground_seen.glsl"
 
 uniform sampler2D ground_coarse;   // Exposed radiance, share that is not the panorama.
 
@@ -13,7 +13,8 @@ layout(location = 2) out float out_depth;
 
 void main() {
     vec3 at;
-    out_depth = plane_depth(ground_ray(gl_FragCoord.xy), at);
+    float share;
+    out_depth = seen_plane(ground_ray(gl_FragCoord.xy), at, share);
     if (isinf(out_depth)) discard;
     vec2 size = vec2(textureSize(ground_coarse, 0));
     vec4 color = textureLod(ground_coarse, 0.5 * gl_FragCoord.xy / size, 0.0);

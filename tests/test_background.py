@@ -50,8 +50,9 @@ CAMERAS = (
 
 
 def whole_map(name):
-    """Return the map's file, read without the package."""
-    return np.asarray(Image.open(asset_path("hdri", f"{name}.containers.png")))
+    """Return the numbers of containers in the map's file, read without the package."""
+    values = np.asarray(Image.open(asset_path("hdri", f"{name}.containers.png")))
+    return np.where(values == 65535, np.uint16(0), values)
 
 
 def texels(numbers, view, yaw_deg):

@@ -125,16 +125,26 @@ def visible_width(camera):
     )
 
 
-def test_a_gate_sees_parts_of_containers_from_above(scenes):
-    cut = 0
+def test_a_gate_sees_parts_of_containers_and_its_sides_the_sky(scenes):
+    cut = sky = 0
     for scene in scenes["gate"]:
         for camera in scene.cameras:
             height = camera.position_mm[2] - scene.ground.height_mm
             assert height < (9500 if camera.name == "roof" else 7000)
-            assert camera.position_mm[2] > camera.target_mm[2]
+            rise = math.dist(camera.position_mm[:2], camera.target_mm[:2])
+            down_deg = math.degrees(math.atan2(camera.position_mm[2] - camera.target_mm[2], rise))
             if camera.name in ("left", "right"):
+                assert height > 1500
                 cut += visible_width(camera) < KINDS[scene.container.kind].length_mm
+                # half of the vertical view of a 16:9 image without distortion
+                half_deg = math.degrees(
+                    math.atan(camera.sensor_width_mm / camera.focal_mm / 2 * 9 / 16)
+                )
+                sky += down_deg < half_deg
+            else:
+                assert down_deg > 0
     assert cut > 0.7 * 2 * COUNT
+    assert 0.4 * 2 * COUNT < sky < 0.95 * 2 * COUNT
 
 
 def test_twins_of_a_gate_are_on_trailers():

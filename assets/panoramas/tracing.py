@@ -12,6 +12,9 @@ from panoramas import sky
 
 Image = NDArray[np.float32]
 
+OTHER = 65535  # number of what stands on the ground and is no container, as in container_map.py
+_LEVEL_M = 0.5  # lower things, such as kerbs and tracks, are part of the ground
+
 _DOWN_REACH = 1.52  # tangent of the view down: 45 degrees, 11.25 for blending, and a margin
 
 
@@ -103,24 +106,28 @@ def add_camera(eye: tuple[float, float, float], down: bool = False) -> None:
 
 
 def container_map(width: int) -> NDArray[np.uint16]:
-    """Return the number of the container at each texel centre, uint16 [width / 2, width].
+    """Return what stands on the ground at each texel centre, uint16 [width / 2, width].
 
-    Numbers count the containers that are seen, from 1, in the order in which they were placed. 0 is
-    everything else. Containers are the objects with a pass index above 0.
+    Numbers count the containers that are seen, from 1, in the order in which they were placed.
+    OTHER is anything else above _LEVEL_M, and 0 is ground, water and sky. Containers are the
+    objects with a pass index above 0.
     """
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = width, width // 2
     scene.render.resolution_percentage = 100
-    scene.view_layers[0].use_pass_object_index = True
+    layer = scene.view_layers[0]
+    layer.use_pass_object_index = layer.use_pass_position = True
     c = scene.cycles
     c.device, c.samples, c.max_bounces = "CPU", 1, 0
     c.use_adaptive_sampling = c.use_denoising = c.use_auto_tile = False
     c.pixel_filter_type, c.filter_width = "BLACKMAN_HARRIS", 0.01  # rays through texel centres
-    found = np.rint(_rendered()["IndexOB.X"]).astype(np.uint16)
+    planes = _rendered()
+    found = np.rint(planes["IndexOB.X"]).astype(np.uint16)
     values, numbers = np.unique(found, return_inverse=True)
     first = 1 if values[0] else 0
-    return (numbers.reshape(found.shape) + first).astype(np.uint16)
+    numbers = (numbers.reshape(found.shape) + first).astype(np.uint16)
+    return np.where((numbers == 0) & (planes["Position.Z"] > _LEVEL_M), np.uint16(OTHER), numbers)
 
 
 def _rendered() -> dict[str, Image]:

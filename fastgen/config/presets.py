@@ -131,9 +131,9 @@ _GATE_SIDE = {
     "focal_mm": 28.0,
     "distance_mm": [2000, 4800],
     "azimuth_deg": [-60, 60],
-    "elevation_deg": [5, 32],
+    "elevation_deg": [-6, 26],
     "aim_right": [-0.95, 0.95],
-    "aim_up": [-0.4, 0.6],
+    "aim_up": [-0.3, 0.9],
     "lens": _BARREL,
 }
 _YARD_POLE = {
@@ -183,10 +183,11 @@ PRESETS: dict[str, Preset] = {
                 "kinds": {"asphalt": 0.4, "concrete": 0.2, "paving": 0.4},
                 "line_probability": 0.6,
                 "line_spacing_mm": [3500, 4500],
+                "reach_mm": [20000, 34000],
             },
             "cameras": {
                 "rear": {"face": "door", **_GATE_END},
-                "front": {"face": "no_door", **_GATE_END},
+                "front": {"face": "no_door", **_GATE_END, "elevation_deg": [2, 38]},
                 "left": {"face": "front", **_GATE_SIDE},
                 "right": {"face": "back", **_GATE_SIDE},
                 "roof": {

@@ -134,6 +134,7 @@ GROUND_BLOCK = Block(
         ("float", "damp_threshold"),
         ("float", "puddle_threshold"),
         ("float", "slab_mm"),
+        ("float", "ground_standing_m"),
     ),
 )
 

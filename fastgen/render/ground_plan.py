@@ -12,7 +12,7 @@ from fastgen.geometry.damage_law import inward_mm
 from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.geometry.prepared_scene import Member
 from fastgen.render.blocks import MAX_BOXES
-from fastgen.render.constants import GROUND_FADE_START
+from fastgen.render.ground_values import standing_mm
 from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
 from fastgen.scene import Ground, Prop
@@ -92,7 +92,7 @@ def ground_plan(
         toward: Unit vector [3] to the first directional light.
     """
     tiles = Tiles(view)
-    seen, near = _plane_tiles(tiles, ground)
+    seen, near = _plane_tiles(tiles, ground, standing_mm(ground, members, props))
     shown = shaded = dark = _none(tiles)
     masks = None
     eye_mm = view.position_m / MM
@@ -137,11 +137,11 @@ def _any(masks: Mask) -> Mask:
     return np.asarray(masks.any(axis=0), bool)
 
 
-def _plane_tiles(tiles: Tiles, ground: Ground) -> tuple[Mask, Mask]:
+def _plane_tiles(tiles: Tiles, ground: Ground, alone_mm: float) -> tuple[Mask, Mask]:
     """Return the tiles that may see the plane, and the tiles that see the plane alone.
 
-    The latter see the disc in which the plane does not fade. Without lens distortion its image is
-    convex, so a tile sees nothing else if its corners do not.
+    The latter see the disc of radius `alone_mm`, in which nothing of the panorama is seen. Without
+    lens distortion its image is convex, so a tile sees nothing else if its corners do not.
     """
     eye_mm, rays = tiles.view.position_m / MM, tiles.rays
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -149,7 +149,7 @@ def _plane_tiles(tiles: Tiles, ground: Ground) -> tuple[Mask, Mask]:
         at = eye_mm[:2] + distance[..., None] * rays[..., :2]
     away = np.where(distance > 0, np.hypot(at[..., 0], at[..., 1]), np.inf)
     corners = np.stack([away[:-1, :-1], away[:-1, 1:], away[1:, :-1], away[1:, 1:]])
-    near = ~_any(corners >= 0.97 * GROUND_FADE_START * ground.reach_mm)
+    near = ~_any(corners >= 0.97 * alone_mm)
     some = np.pad(_any(corners < ground.reach_mm), 1)
     # a tile beside one that sees the plane may see some between its corners
     rows = some[:-2] | some[1:-1] | some[2:]

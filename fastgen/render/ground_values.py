@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastgen.geometry.prepared_scene import Member
 from fastgen.light.ground_light import GRID, LOW_GAP_M, GroundLight
 from fastgen.render.blocks import MAX_BOXES
+from fastgen.render.constants import GROUND_FADE_START
 from fastgen.scene import Ground, Prop
 from fastgen.scene.boxes import prop_box
 from fastgen.scene.limits import MM
@@ -19,6 +20,9 @@ _NO_GAP_M = 1e6
 """Height of a gap below a box for which the grid of light is fine enough."""
 
 _LEAST_GAP_M = 1e-3
+
+_CLEARANCE_MM = 1500.0
+"""Width of the ground around the scene that no part of the panorama hides."""
 
 _FAR_BELOW_M = -1e4
 """Height of boxes that a program has but the scene has not."""
@@ -82,7 +86,18 @@ def ground_values(
         "damp_threshold": 1.35 - 2.1 * wet if wet else 9.0,
         "puddle_threshold": 1.1 - 0.65 * wet**1.5 if wet else 9.0,
         "slab_mm": 4000 + np.mod(abs(ground.noise_offset_mm[0]), 2000.0),
+        "ground_standing_m": standing_mm(ground, members, props) * MM,
     }
+
+
+def standing_mm(ground: Ground, members: Sequence[Member], props: Sequence[Prop]) -> float:
+    """Return the distance from which what a panorama shows standing begins to hide the plane.
+
+    It is just beyond the containers and props of the scene, so that all stand on the plane.
+    """
+    boxes = [member.box for member in members] + [prop_box(prop) for prop in props]
+    far = [np.linalg.norm(box.corners_mm[:, :2], axis=-1).max() for box in boxes]
+    return min(max(far, default=0.0) + _CLEARANCE_MM, GROUND_FADE_START * ground.reach_mm)
 
 
 def _normal_threshold(share: float) -> float:

@@ -267,6 +267,7 @@ class Renderer:
                 **self._materials.of(decals, self._shapes.zone_table(container, spreader)),
                 "specular_map": light.specular,
                 "irradiance_map": light.irradiance,
+                "standing_map": light.standing,
                 "environment_map": self._lights.background(scene.environment.name),
             },
         )
