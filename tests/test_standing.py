@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 
 from fastgen import Config, Generator
-from fastgen.light.container_map import BORDER, STANDING_SIZE, load_container_map
+from fastgen.light.container_map import STANDING_SIZE, load_container_map
 from fastgen.light.hdri import bundled_hdris
-from fastgen.light.octahedral import sample_octahedral
+from fastgen.light.octahedral import BORDER, sample_octahedral
 from fastgen.resources import asset_path
 from fastgen.scene import Camera, EnvironmentView, Ground, Lens, Spreader
 from fastgen.scene.container_kinds import KINDS
