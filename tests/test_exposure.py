@@ -16,7 +16,7 @@ from fastgen.errors import ConfigError
 from fastgen.frame import Frame
 from fastgen.generator import Generator
 from fastgen.light.hdri import bundled_hdris, hours_of, illuminance_of
-from fastgen.scene import Camera, Scene
+from fastgen.scene import Camera, Ground, Scene
 from fastgen.scene.optics import ChromaNoise, Meter, Noise, Response, Sensor, Weather
 from fastgen.srgb import DECODED
 
@@ -154,6 +154,23 @@ def test_a_limited_meter_changes_only_dim_scenes(generators):
             limited = generator.exposure(lit, replace(camera, sensor=Sensor(meter=METER)))
             assert limited / free <= most + 1e-9
             assert lx < 1e4 or limited == pytest.approx(free)
+
+
+def test_a_meter_sees_the_ground_below_the_horizon(generators):
+    """A view wholly below the horizon weighs the ground by 35 %, and one to the sky does not."""
+    generator = generators(Config.preset(), seed=4, size=SIZE)
+    scene = generator.scene(0)
+    scene = replace(scene, environment=replace(scene.environment, illuminance_lx=5e4))
+    down = Camera("down", (0, -9000, 12000), (0, -2000, 0), 35.0, sensor=Sensor(meter=METER))
+    up = replace(down, name="up", target_mm=(0, -2000, 26000))
+    for camera, weight in ((down, 0.35), (up, 0.0), (replace(down, sensor=None), 0.0)):
+        dark, bright = (
+            generator.exposure(
+                replace(scene, ground=Ground("concrete", -2000.0, albedo=(albedo,) * 3)), camera
+            )
+            for albedo in (0.05, 0.4)
+        )
+        assert np.log2(dark / bright) == pytest.approx(3 * weight, abs=1e-6)
 
 
 def test_scenes_hold_the_meter_and_the_illuminance_that_were_drawn():

@@ -103,7 +103,10 @@ tenth are at dusk, and the rest at night. This is a choice; `fastgen fit` finds 
 camera."""
 
 _GATES = {"port_gate": 14.0, "port_gate_rain": 9.0}
-_YARDS = {"port_aisle": 9.0, "port_aisle_fog": 5.0, "port_rail": 6.0, "port_rail_rain": 4.0}
+_YARDS = {
+    **{"port_aisle": 9.0, "port_aisle_fog": 5.0},
+    **{"port_rail": 6.0, "port_rail_rain": 4.0, "port_rail_dusk": 2.0},
+}
 
 
 def _on_ground(places: dict[str, float]) -> dict[str, Any]:

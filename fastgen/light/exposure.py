@@ -15,14 +15,22 @@ _BRIGHTEST_AIR = 0.65
 
 
 def metered_exposure(
-    light: Ambient, cd_m2: float, yaw_deg: float, view: View, camera: Camera, paint: Color
+    light: Ambient,
+    cd_m2: float,
+    yaw_deg: float,
+    view: View,
+    camera: Camera,
+    paint: Color,
+    ground: Color | None = None,
 ) -> Exposure:
     """Return the exposure that brings the metered mean to MIDDLE_GREY, or to a meter's target.
 
     The metered mean is geometric: 65 % the container, 35 % the background in view. The container
     is taken as a plane that faces the camera squarely in azimuth: upright, or level if the camera
     looks up or down by more than 45 degrees. Its reflectance is the geometric mean of its paint and
-    MIDDLE_GREY, because a metering pattern averages over other surfaces as well.
+    MIDDLE_GREY, because a metering pattern averages over other surfaces as well. A meter with
+    limits sees the ground of the scene below the horizon, in open light; others see the environment
+    there.
 
     Args:
         light: Light of the environment and of lamps.
@@ -31,6 +39,7 @@ def metered_exposure(
         view: Projection of the camera.
         camera: Its `exposure_ev` is added in stops. The meter of its sensor limits the exposure.
         paint: Linear albedo of the container.
+        ground: Mean linear albedo of the ground, if the scene has one.
     """
     forward = view.rotation[2]
     level, upright = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -42,8 +51,14 @@ def metered_exposure(
     behind = metered_luminance(light, forward, view.half_angle_deg, yaw_deg)
     center = max(reflectance * falling, _MIN_LUMINANCE)
     behind = max(behind, _MIN_LUMINANCE)
-    metered = np.exp(_CENTER_WEIGHT * np.log(center) + (1 - _CENTER_WEIGHT) * np.log(behind))
     meter = camera.sensor.meter if camera.sensor else None
+    if meter and ground:
+        open_light = float(irradiance_at(light, upright[None], yaw_deg)[0] @ REC_709)
+        paved = max(float(np.array(ground) @ REC_709) * open_light, _MIN_LUMINANCE)
+        rise_deg = np.rad2deg(np.arcsin(np.clip(forward[2], -1, 1)))
+        below = np.clip(0.5 - 0.5 * rise_deg / view.half_angle_deg, 0, 1)
+        behind = float(paved**below * behind ** (1 - below))
+    metered = np.exp(_CENTER_WEIGHT * np.log(center) + (1 - _CENTER_WEIGHT) * np.log(behind))
     if meter is None:
         return Exposure(float(MIDDLE_GREY / metered * 2.0**camera.exposure_ev))
     return limited_exposure(float(metered), cd_m2, meter, camera.exposure_ev)

@@ -71,7 +71,8 @@ class SceneLights:
         unlit = self.of(environment.name).ambient
         cd_m2 = unit_luminance(unlit, environment.illuminance_lx)
         light = self.ambient(environment)
-        return metered_exposure(light, cd_m2, environment.yaw_deg, view, camera, paint)
+        ground = mean_albedo(scene.ground) if scene.ground else None
+        return metered_exposure(light, cd_m2, environment.yaw_deg, view, camera, paint, ground)
 
     def around(
         self, prepared: PreparedScene, resources: Callable[[PreparedScene], SceneResources]
