@@ -10,9 +10,9 @@ and the sun's disc are added from exact maps afterwards, so that the disc keeps 
 sky has no noise. Beside each panorama, NAME.containers.png numbers the containers that it shows, and marks
 what else stands on the ground.
 
-The night of the gate and of the aisle and the dusk at the rails are not part of the package: at the
-night of the gate, denoising leaves red stains on the ground. Render them with `--out` into a folder
-for `--hdri`.
+The night of the aisle and the dusk at the rails need --samples 16. The night of the gate is not part
+of the package, because denoising leaves red stains on its ground. Render it with `--out` into a
+folder for `--hdri`.
 """
 
 import argparse

@@ -21,7 +21,7 @@ from fastgen.torch import (
 
 # Panoramas that version 0.23 lacked.
 ADDED = [
-    *(f"port_{place}" for place in ("gate", "gate_rain", "aisle", "aisle_fog")),
+    *(f"port_{place}" for place in ("gate", "gate_rain", "aisle", "aisle_fog", "aisle_night")),
     *(f"port_{place}" for place in ("rail", "rail_rain", "rail_dusk")),
 ]
 
