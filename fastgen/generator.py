@@ -366,4 +366,4 @@ def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:
     if name not in hdris:
         raise ConfigError(f"environment: no HDRI {name!r}{nearest(name, hdris)}")
     light, containers = load_environment(hdris[name]), load_container_map(hdris[name])
-    return light if containers is None else replace(light, standing=containers.standing)
+    return light if containers is None else replace(light, obstacles=containers.obstacles)

@@ -1,7 +1,7 @@
 // float seen_plane(vec3 ray, out vec3 at, out float share): depth of the ground where it is seen, infinite
-// elsewhere. at: World position in m where the ray meets the plane. share: Of the ground; the rest is the
-// panorama. Far away, the ground fades into the panorama. Beyond the containers and props, what the panorama
-// shows standing on its own ground hides it.
+// elsewhere. at: World position in m where the ray meets the plane. share: Opacity of the ground over the
+// panorama. Far away, the ground fades into the panorama. Behind the containers and props of the scene,
+// obstacles of the panorama hide it.
 
 #include "ground.constants"
 #include "units.constants"
@@ -9,7 +9,7 @@
 #include "environment_map.glsl"
 #include "ground_ray.glsl"
 
-uniform sampler2D standing_map;   // Share that stands on the ground; octahedral.
+uniform sampler2D obstacle_map;   // Share of containers and other obstacles; octahedral.
 
 float seen_plane(vec3 ray, out vec3 at, out float share) {
     float depth = plane_depth(ray, at);
@@ -17,13 +17,14 @@ float seen_plane(vec3 ray, out vec3 at, out float share) {
 #if GROUND_FADES
     if (isinf(depth)) return depth;
     float away_m = length(at.xy);
-    if (away_m < ground_standing_m) return depth;
-    vec2 uv = bordered(octahedral(to_environment(ray)), float(textureSize(standing_map, 0).x));
-    float standing = textureLod(standing_map, uv, 0.0).r;
-    standing *= smoothstep(ground_standing_m, 1.6 * ground_standing_m, away_m);
+    if (away_m < ground_clear_m) return depth;
+    vec2 uv = bordered(octahedral(to_environment(ray)), float(textureSize(obstacle_map, 0).x));
+    float hidden = textureLod(obstacle_map, uv, 0.0).r *
+                   smoothstep(ground_clear_m, 1.6 * ground_clear_m, away_m);
+    if (dot(ray.xy, at.xy) < 0.0) hidden = 0.0;   // In front of the scene.
     share = (1.0 - smoothstep(GROUND_FADE_START * ground_reach_m, ground_reach_m, away_m)) *
-            (1.0 - smoothstep(0.25, 0.5, standing));
-    if (standing >= 0.5) depth = NO_DEPTH;
+            (1.0 - smoothstep(0.25, 0.5, hidden));
+    if (hidden >= 0.5) depth = NO_DEPTH;
 #endif
     return depth;
 }

@@ -157,7 +157,7 @@ def test_a_limited_meter_changes_only_dim_scenes(generators):
 
 
 def test_a_meter_sees_the_ground_below_the_horizon(generators):
-    """A view wholly below the horizon weighs the ground by 35 %, and one to the sky does not."""
+    """A view wholly below the horizon weighs the ground by 35 %; a view of the sky ignores it."""
     generator = generators(Config.preset(), seed=4, size=SIZE)
     scene = generator.scene(0)
     scene = replace(scene, environment=replace(scene.environment, illuminance_lx=5e4))

@@ -71,6 +71,30 @@ def test_parts_of_a_layout_never_overlap_and_fill_the_decal():
                             assert (meet < 0).any(), (font.name, form)
 
 
+def test_letters_on_flats_and_their_frames_keep_apart_in_all_fonts_and_sizes():
+    config = Config.from_values(
+        {"markings": {"cap_mm": [100, 180], "identifiers": {"rib_pitch": 1.0}}}, Config.preset()
+    )
+    generator, fonts, pitched = Generator(config, seed=5), glyph_tiles()[1], 0
+    for index in range(60):
+        for decal in identifiers([generator.scene(index)]):
+            if decal.vertical or not any(part.pitch_mm for part in decal.parts):
+                continue
+            pitched += 1
+            lines = {}
+            for glyph in decal.lettering.glyphs:
+                ink = fonts[decal.font].glyphs[glyph.char]
+                half = (ink.ink_right - ink.ink_left) / 2 * decal.cap_mm
+                middle = (glyph.x0 + glyph.x1) / 2
+                lines.setdefault(round(glyph.y0), {})[round(middle, 3)] = max(
+                    half, lines.get(round(glyph.y0), {}).get(round(middle, 3), 0.0)
+                )
+            for line in lines.values():
+                for (a, half), (b, other) in itertools.pairwise(sorted(line.items())):
+                    assert b - a > half + other, (decal.font, decal.cap_mm, decal.text)
+    assert pitched > 30
+
+
 def test_columns_have_gaps_between_owner_code_serial_and_check_digit(scenes):
     columns = [decal for decal in identifiers(scenes) if decal.vertical]
     assert len(columns) > 20

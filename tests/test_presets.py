@@ -131,8 +131,8 @@ def test_a_gate_sees_parts_of_containers_and_its_sides_the_sky(scenes):
         for camera in scene.cameras:
             height = camera.position_mm[2] - scene.ground.height_mm
             assert height < (9500 if camera.name == "roof" else 7000)
-            rise = math.dist(camera.position_mm[:2], camera.target_mm[:2])
-            down_deg = math.degrees(math.atan2(camera.position_mm[2] - camera.target_mm[2], rise))
+            run_mm = math.dist(camera.position_mm[:2], camera.target_mm[:2])
+            down_deg = math.degrees(math.atan2(camera.position_mm[2] - camera.target_mm[2], run_mm))
             if camera.name in ("left", "right"):
                 assert height > 1500
                 cut += visible_width(camera) < KINDS[scene.container.kind].length_mm

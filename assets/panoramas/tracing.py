@@ -12,8 +12,8 @@ from panoramas import sky
 
 Image = NDArray[np.float32]
 
-OTHER = 65535  # number of what stands on the ground and is no container, as in container_map.py
-_LEVEL_M = 0.5  # lower things, such as kerbs and tracks, are part of the ground
+OTHER = 65535  # value of obstacles that are no containers, as in container_map.py
+_LEVEL_M = 0.5  # what is lower counts as ground: kerbs, tracks and the lowest part of columns
 
 _DOWN_REACH = 1.52  # tangent of the view down: 45 degrees, 11.25 for blending, and a margin
 
@@ -106,7 +106,7 @@ def add_camera(eye: tuple[float, float, float], down: bool = False) -> None:
 
 
 def container_map(width: int) -> NDArray[np.uint16]:
-    """Return what stands on the ground at each texel centre, uint16 [width / 2, width].
+    """Return the container or other obstacle at each texel centre, uint16 [width / 2, width].
 
     Numbers count the containers that are seen, from 1, in the order in which they were placed.
     OTHER is anything else above _LEVEL_M, and 0 is ground, water and sky. Containers are the

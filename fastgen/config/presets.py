@@ -104,8 +104,12 @@ camera."""
 
 _GATES = {"port_gate": 14.0, "port_gate_rain": 9.0}
 _YARDS = {
-    **{"port_aisle": 9.0, "port_aisle_fog": 5.0, "port_aisle_night": 2.0},
-    **{"port_rail": 6.0, "port_rail_rain": 4.0, "port_rail_dusk": 2.0},
+    "port_aisle": 9.0,
+    "port_aisle_fog": 5.0,
+    "port_aisle_night": 2.0,
+    "port_rail": 6.0,
+    "port_rail_rain": 4.0,
+    "port_rail_dusk": 2.0,
 }
 
 

@@ -115,8 +115,8 @@ class GroundConfig:
         line_spacing_mm: Distance between parallel lines.
         line_yaw_deg: Direction of the lines, relative to the length of the container.
         reach_mm: Horizontal distance at which the ground has faded completely into the HDRI. It
-            starts to fade at half of this distance. Beyond the containers of the scene, what the
-            container map of an HDRI marks as standing hides the ground.
+            starts to fade at half of this distance. Behind the containers of the scene, obstacles
+            in the container map of an HDRI hide the ground.
     """
 
     kinds: Annotated[dict[Annotated[str, OneOf(GROUNDS)], Weight], MinLen(1)] = field(

@@ -14,6 +14,7 @@ from fastgen.dataset.progress import Progress
 from fastgen.dataset.seal import digest
 from fastgen.errors import ConfigError, nearest
 from fastgen.formats.registry import formats_of
+from fastgen.light.container_map import load_container_map
 from fastgen.light.environment import load_environment
 from fastgen.light.hdri import find_hdris
 from fastgen.postprocess import source_hash
@@ -105,14 +106,15 @@ def _check(job: Job, worker_count: int) -> None:
 
 
 def _load_all(hdris: Sequence[Path]) -> None:
-    """Load the light of all HDRIs: this reports a broken file now, and fills the cache.
+    """Load the light and the container maps of all HDRIs.
 
-    The first time takes seconds for each HDRI.
+    This reports a broken file now, and fills the cache. The first time takes seconds for each HDRI.
     """
     progress = Progress(len(hdris), unit="HDRIs")
     try:
         for path in hdris:
             load_environment(path)
+            load_container_map(path)
             progress.add(1)
     finally:
         progress.close_if_drawn()

@@ -1,6 +1,7 @@
 """Layouts of container identifiers (ISO 6346, section 7, and the practice of container makers)."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from fastgen.decals.glyphs import BOX, Font
 from fastgen.decals.iso6346 import Identifier
@@ -39,7 +40,8 @@ class Form:
         column_gap_mm: Gap between the columns of an upright identifier.
         pitch_mm: Distance between the letters of a line, or between the baselines of a column; 0
             for the usual one. Lines with a pitch have all their letters in columns of that pitch,
-            without the gaps above and with one free column before the serial number of rows.
+            without the gaps above and with one free column before the serial number of rows. A
+            size-type code that is not under the serial number is then under the owner code.
     """
 
     layout: str
@@ -136,6 +138,15 @@ def _block(identifier: Identifier, form: Form, font: Font) -> tuple[TextPart, ..
         TextPart("check", identifier.check, check_x, step, boxed=form.boxed),
         TextPart("type", identifier.size_type, 0.0, 0.0),
     )
+
+
+def least_pitch_mm(identifier: Identifier, form: Form, font: Font) -> float:
+    """Return the pitch at which neighbouring letters, or a letter and the frame, touch."""
+    lines = identifier.owner, identifier.serial, identifier.size_type
+    halves = [[_width(char, form, font) / 2 for char in line] for line in lines]
+    check = _frame(form, font)[0] or _width(identifier.check, form, font) / 2
+    halves[1].append(check)
+    return max(a + b for line in halves for a, b in pairwise(line))
 
 
 def _spaced(identifier: Identifier, form: Form, font: Font) -> tuple[TextPart, ...]:

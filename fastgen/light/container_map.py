@@ -1,10 +1,10 @@
-"""Container maps: which container, or what else above the ground, a panorama shows where.
+"""Container maps: the container or other obstacle that a panorama shows in each direction.
 
 A container map is a 16-bit grey PNG beside its panorama NAME.exr or NAME.hdr, called
 NAME.containers.png. It covers the same sphere in the same orientation, at any resolution. Its
-values number the containers from 1. OTHER is anything else that stands on the ground, and 0 is
-ground, water and sky. The bundled ports have one each, which assets/build_panoramas.py renders from
-the same model as the panorama.
+values 1 to 65534 number the containers. OTHER is any other obstacle, such as a column or a vehicle,
+and 0 is ground, water and sky. The bundled ports have one each, which assets/build_panoramas.py
+renders from the same model as the panorama.
 """
 
 import hashlib
@@ -27,13 +27,13 @@ from fastgen.light.octahedral import BORDER, fill_border, octahedral_decode
 VERSION = 2  # raise when the stored arrays change
 
 OTHER = 65535
-"""Value of what stands on the ground and is no container."""
+"""Value of obstacles that are no containers."""
 
-STANDING_SIZE = 512
-"""Texels along a side of `ContainerMap.standing`, including the border."""
+OBSTACLES_SIZE = 512
+"""Texels along a side of `ContainerMap.obstacles`, including the border."""
 
-_STANDING_SAMPLES = 4
-"""Directions per texel and axis from which `ContainerMap.standing` is found."""
+_OBSTACLE_SAMPLES = 4
+"""Samples per texel and axis of `ContainerMap.obstacles`."""
 
 _PNG_START = struct.Struct(">8s8xIIBB")
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -48,7 +48,7 @@ _LAYOUT = {
     "rows": "uint16 R W",
     "first_row": "int64 1",
     "points": f"float32 N {POINTS} 3",
-    "standing": f"uint8 {STANDING_SIZE} {STANDING_SIZE}",
+    "obstacles": f"uint8 {OBSTACLES_SIZE} {OBSTACLES_SIZE}",
 }
 """Layout of a ContainerMap in the disk cache."""
 
@@ -63,15 +63,14 @@ class ContainerMap:
         first_row: Row of the whole map that is the first of `rows`; -1 if that is above the map.
         points: float32 [count + 1, POINTS, 3], directions in the map's frame that are spread over
             each container, by its number.
-        standing: uint8 [STANDING_SIZE, STANDING_SIZE], octahedral with a border as in
-            octahedral.py: share of each texel, of 255, that shows a container or another thing
-            which stands on the ground.
+        obstacles: uint8 [OBSTACLES_SIZE, OBSTACLES_SIZE], octahedral with a border as in
+            octahedral.py: share of each texel, of 255, that shows a container or another obstacle.
     """
 
     rows: NDArray[np.uint16]
     first_row: int
     points: NDArray[np.float32]
-    standing: NDArray[np.uint8]
+    obstacles: NDArray[np.uint8]
 
     @property
     def count(self) -> int:
@@ -132,7 +131,7 @@ def load_container_map(hdri: Path) -> ContainerMap | None:
         what=f"container map {path.name}",
     )
     return ContainerMap(
-        stored["rows"], int(stored["first_row"][0]), stored["points"], stored["standing"]
+        stored["rows"], int(stored["first_row"][0]), stored["points"], stored["obstacles"]
     )
 
 
@@ -150,7 +149,7 @@ def _decoded(data: bytes, path: Path) -> disk_cache.Arrays:
     numbers = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if numbers is None or numbers.shape != (height, width):
         raise AssetError(f"{path}: a damaged PNG")
-    standing = _standing(numbers > 0)
+    obstacles = _obstacles(numbers > 0)
     numbers[numbers == OTHER] = 0
     used = np.flatnonzero(numbers.any(axis=1))
     first, limit = (int(used[0]), int(used[-1]) + 1) if len(used) else (0, 0)
@@ -160,22 +159,22 @@ def _decoded(data: bytes, path: Path) -> disk_cache.Arrays:
         "rows": rows,
         "first_row": np.array([first - 1], np.int64),
         "points": _points(rows, first - 1),
-        "standing": standing,
+        "obstacles": obstacles,
     }
 
 
-def _standing(stands: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Return ContainerMap.standing of what stands on the ground, bool [H, 2 H]."""
-    per_radian = stands.shape[1] / (2 * np.pi)
-    inner = STANDING_SIZE - 2 * BORDER
-    step = (np.arange(inner * _STANDING_SAMPLES) + 0.5) / (inner * _STANDING_SAMPLES)
-    shares = np.zeros((STANDING_SIZE, STANDING_SIZE, 1), np.float32)
+def _obstacles(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return ContainerMap.obstacles of a mask of obstacles, bool [H, 2 H]."""
+    per_radian = mask.shape[1] / (2 * np.pi)
+    inner = OBSTACLES_SIZE - 2 * BORDER
+    step = (np.arange(inner * _OBSTACLE_SAMPLES) + 0.5) / (inner * _OBSTACLE_SAMPLES)
+    shares = np.zeros((OBSTACLES_SIZE, OBSTACLES_SIZE, 1), np.float32)
     for row, lines in enumerate(np.split(step, inner), start=BORDER):
         x, y, z = np.moveaxis(octahedral_decode(np.stack(np.meshgrid(step, lines), -1)), -1, 0)
-        column = ((np.pi - np.arctan2(y, x)) * per_radian).astype(np.int64) % stands.shape[1]
+        column = ((np.pi - np.arctan2(y, x)) * per_radian).astype(np.int64) % mask.shape[1]
         line = (np.arctan2(np.hypot(x, y), z) * per_radian).astype(np.int64)
-        found = stands[np.minimum(line, len(stands) - 1), column]
-        texels = found.reshape(_STANDING_SAMPLES, inner, _STANDING_SAMPLES).mean(axis=(0, 2))
+        found = mask[np.minimum(line, len(mask) - 1), column]
+        texels = found.reshape(_OBSTACLE_SAMPLES, inner, _OBSTACLE_SAMPLES).mean(axis=(0, 2))
         shares[row, BORDER:-BORDER, 0] = texels
     fill_border(shares)
     return np.asarray(np.rint(255 * shares[..., 0]), np.uint8)

@@ -80,8 +80,8 @@ class EnvironmentLight(Ambient):
     B is the power of two nearest twice the width of the HDRI, from 512 to 2048, which looks as
     sharp as the HDRI. It is 4096 for an HDRI wider than 4096; a finer map would take 67 MB and is
     not visible in images of usual size."""
-    standing: NDArray[np.uint8] | None = None
-    """[S, S] what stands on the ground, see `ContainerMap.standing`; None if it is unknown."""
+    obstacles: NDArray[np.uint8] | None = None
+    """[S, S] as `ContainerMap.obstacles`; None if it is unknown."""
 
 
 def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> EnvironmentLight:

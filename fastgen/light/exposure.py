@@ -28,9 +28,9 @@ def metered_exposure(
     The metered mean is geometric: 65 % the container, 35 % the background in view. The container
     is taken as a plane that faces the camera squarely in azimuth: upright, or level if the camera
     looks up or down by more than 45 degrees. Its reflectance is the geometric mean of its paint and
-    MIDDLE_GREY, because a metering pattern averages over other surfaces as well. A meter with
-    limits sees the ground of the scene below the horizon, in open light; others see the environment
-    there.
+    MIDDLE_GREY, because a metering pattern averages over other surfaces as well. For a
+    camera with `sensor.meter`, the share of the view's width that is below the horizon shows the
+    ground of the scene, lit by the whole environment.
 
     Args:
         light: Light of the environment and of lamps.

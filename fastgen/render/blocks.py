@@ -134,7 +134,7 @@ GROUND_BLOCK = Block(
         ("float", "damp_threshold"),
         ("float", "puddle_threshold"),
         ("float", "slab_mm"),
-        ("float", "ground_standing_m"),
+        ("float", "ground_clear_m"),
     ),
 )
 

@@ -52,16 +52,16 @@ class GpuLight:
         )
         size = light.irradiance.shape[0]
         self.irradiance = ctx.texture((size, size), 4, _half(light.irradiance), dtype="f2")
-        standing = np.zeros((1, 1), np.uint8) if light.standing is None else light.standing
-        self.standing = ctx.texture(standing.shape, 1, np.ascontiguousarray(standing))
-        for texture in (self.specular, self.irradiance, self.standing):
+        obstacles = np.zeros((1, 1), np.uint8) if light.obstacles is None else light.obstacles
+        self.obstacles = ctx.texture(obstacles.shape, 1, np.ascontiguousarray(obstacles))
+        for texture in (self.specular, self.irradiance, self.obstacles):
             texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
             texture.repeat_x = texture.repeat_y = False
         disk_cache.unload(light.background)
 
     def release(self) -> None:
         """Free all GL objects."""
-        for texture in (self.specular, self.irradiance, self.standing):
+        for texture in (self.specular, self.irradiance, self.obstacles):
             texture.release()
 
 

@@ -12,7 +12,7 @@ from fastgen.geometry.damage_law import inward_mm
 from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.geometry.prepared_scene import Member
 from fastgen.render.blocks import MAX_BOXES
-from fastgen.render.ground_values import standing_mm
+from fastgen.render.ground_values import clear_radius_mm
 from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
 from fastgen.scene import Ground, Prop
@@ -92,7 +92,7 @@ def ground_plan(
         toward: Unit vector [3] to the first directional light.
     """
     tiles = Tiles(view)
-    seen, near = _plane_tiles(tiles, ground, standing_mm(ground, members, props))
+    seen, near = _plane_tiles(tiles, ground, clear_radius_mm(ground, members, props))
     shown = shaded = dark = _none(tiles)
     masks = None
     eye_mm = view.position_m / MM

@@ -86,14 +86,14 @@ def ground_values(
         "damp_threshold": 1.35 - 2.1 * wet if wet else 9.0,
         "puddle_threshold": 1.1 - 0.65 * wet**1.5 if wet else 9.0,
         "slab_mm": 4000 + np.mod(abs(ground.noise_offset_mm[0]), 2000.0),
-        "ground_standing_m": standing_mm(ground, members, props) * MM,
+        "ground_clear_m": clear_radius_mm(ground, members, props) * MM,
     }
 
 
-def standing_mm(ground: Ground, members: Sequence[Member], props: Sequence[Prop]) -> float:
-    """Return the distance from which what a panorama shows standing begins to hide the plane.
+def clear_radius_mm(ground: Ground, members: Sequence[Member], props: Sequence[Prop]) -> float:
+    """Return the radius around the origin within which no obstacle of a panorama hides the plane.
 
-    It is just beyond the containers and props of the scene, so that all stand on the plane.
+    It reaches just beyond the containers and props of the scene.
     """
     boxes = [member.box for member in members] + [prop_box(prop) for prop in props]
     far = [np.linalg.norm(box.corners_mm[:, :2], axis=-1).max() for box in boxes]

@@ -267,7 +267,7 @@ class Renderer:
                 **self._materials.of(decals, self._shapes.zone_table(container, spreader)),
                 "specular_map": light.specular,
                 "irradiance_map": light.irradiance,
-                "standing_map": light.standing,
+                "obstacle_map": light.obstacles,
                 "environment_map": self._lights.background(scene.environment.name),
             },
         )

@@ -1,5 +1,6 @@
 """Sampling of identifiers (ISO 6346)."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,6 +13,7 @@ from fastgen.decals.identifier_layout import (
     Form,
     identifier_lines,
     identifier_parts,
+    least_pitch_mm,
     row_widths,
 )
 from fastgen.decals.lettering import GLYPH_PITCH_CAPS, Lettering
@@ -26,6 +28,9 @@ _TRIES = 12
 
 _FLATS = 4
 """Flats that are tried for the first letter where letters are spaced by half waves."""
+
+_LEAST_GAP_CAPS = 0.08
+"""Least gap between letters that are spaced by half waves, in cap heights."""
 
 _COLUMN_CAPS = 17.0
 """Height of the tallest column in cap heights."""
@@ -65,7 +70,7 @@ def _forms(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generator) -> li
     boxed = bool(rng.random() < settings.check_digit_box)
     cap = config.cap_mm.lo if sheet.clearance else between(rng, config.cap_mm)
     on_ribs = sheet.face != "door" and rng.random() < settings.rib_pitch
-    steep = sheet.face == "no_door"  # a stem on one of its flanks could hardly be seen
+    steep = sheet.face == "no_door"  # letter strokes on its flanks are hardly visible
     pitch = sheet.half_wave_mm if (on_ribs or steep) and sheet.face != "roof" else 0.0
     made = [_form(first, cap, boxed, pitch, rng)]
     others = [name for name in LAYOUTS if name != first]
@@ -123,12 +128,17 @@ def _in_one_piece(
     sheet: Sheet, style: Style, form: Form, number: int, rng: np.random.Generator
 ) -> Decal | None:
     """Place an identifier at the upper right or, if it is the second one, at the left."""
+    spaced = form.layout != "column" and form.pitch_mm > 0
+    touching = least_pitch_mm(style.identifier, form, style.font) + _LEAST_GAP_CAPS * form.cap_mm
+    if spaced and form.pitch_mm < touching:
+        return None
     text, lettering = _written(style, form)
+    if spaced:
+        center = _on_flats(sheet, lettering, form.pitch_mm, number, rng)
+        return placed(text, sheet, center) if center else None
     center = None
     if form.layout == "column" and sheet.face == "no_door":
         center = _on_flat(sheet, lettering, rng)
-    if form.pitch_mm and form.layout != "column":
-        center = _on_flats(sheet, lettering, form.pitch_mm, number, rng)
     if not center:
         x = Range(0.86, 1.0) if number == 0 else Range(0.0, 0.12)
         x = Range(0.5, 1.0) if sheet.clearance else x
@@ -171,7 +181,10 @@ def _across_bar(
 def _on_flats(
     sheet: Sheet, text: Lettering, pitch_mm: float, number: int, rng: np.random.Generator
 ) -> Vec2 | None:
-    """Place letters with a pitch of half a wave on the flats, as far up and aside as they fit."""
+    """Place letters with a pitch of half a wave on the flats, high and near the right end.
+
+    The second text of a wall is near the left end.
+    """
     first = (text.glyphs[0].x0 + text.glyphs[0].x1) / 2
     flat = sum(sheet.flats[0]) / 2
     least, most = EDGE_MM, sheet.size[0] - EDGE_MM - text.size_mm[0]
@@ -179,9 +192,9 @@ def _on_flats(
     high = math.floor((most + first - flat) / pitch_mm)
     places = range(low, high + 1)[:: 1 if number else -1]
     room = sheet.size[1] - 2 * EDGE_MM - text.size_mm[1]
-    for place in places[:_FLATS]:
+    for lowest, place in itertools.product((0.82, 0.3), places[:_FLATS]):
         x = flat + place * pitch_mm - first + text.size_mm[0] / 2
-        y = EDGE_MM + text.size_mm[1] / 2 + room * rng.uniform(0.82, 1.0)
+        y = EDGE_MM + text.size_mm[1] / 2 + room * rng.uniform(lowest, 1.0)
         if sheet.claim((tenth(x), tenth(y)), text.size_mm, text.parts):
             return tenth(x), tenth(y)
     return None

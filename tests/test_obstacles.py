@@ -1,4 +1,4 @@
-"""What panoramas show standing on their ground hides the ground of the scene far away."""
+"""Obstacles in panoramas hide the ground of the scene behind its containers."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from fastgen import Config, Generator
-from fastgen.light.container_map import STANDING_SIZE, load_container_map
+from fastgen.light.container_map import OBSTACLES_SIZE, load_container_map
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.octahedral import BORDER, sample_octahedral
 from fastgen.resources import asset_path
@@ -37,7 +37,7 @@ def values_of(name):
     return np.asarray(Image.open(asset_path("hdri", f"{name}.containers.png")))
 
 
-def standing_at(name, directions, yaw_deg):
+def obstacle_at(name, directions, yaw_deg):
     """Return whether the map's texel in each direction [..., 3] has anything above the ground."""
     values = values_of(name)
     height, width = values.shape
@@ -59,7 +59,7 @@ def seen(scene, name, camera, quality):
 
     The facts are bool [H, W], whether the pixel shows no object and its ray meets the plane;
     float [H, W], how far from the origin in reaches of the ground; and bool [H, W], whether the map
-    has something standing there.
+    has an obstacle there.
     """
     yaw_deg = 40.0
     placed = replace(scene, environment=EnvironmentView(name, yaw_deg))
@@ -70,12 +70,12 @@ def seen(scene, name, camera, quality):
     free = (sample.ids == 0) & (sample.damage == 0) & (rays[..., 2] < -1e-6)
     steps = (scene.ground.height_mm - eye[2]) / np.minimum(rays[..., 2], -1e-6)
     away = np.linalg.norm((eye + steps[..., None] * rays)[..., :2], axis=-1) / REACH_MM
-    return sample, alone, free, away, standing_at(name, rays, yaw_deg)
+    return sample, alone, free, away, obstacle_at(name, rays, yaw_deg)
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced"])
 @pytest.mark.parametrize(("name", "camera"), list(zip(PORTS, CAMERAS, strict=True)))
-def test_ground_is_hidden_where_the_map_has_something_standing(scene, quality, name, camera):
+def test_ground_is_hidden_where_the_map_has_an_obstacle(scene, quality, name, camera):
     sample, alone, free, away, stands = seen(scene, name, camera, quality)
     # the map of the renderer has an eighth of the resolution
     kernel = np.ones((13, 13), np.uint8)
@@ -104,15 +104,15 @@ def test_containers_stand_on_the_ground_whatever_the_map_has_there(scene, qualit
 def test_the_octahedral_map_has_the_mean_of_the_texels_around():
     containers = load_container_map(bundled_hdris()["port_gate"])
     assert containers is not None
-    assert containers.standing.shape == (STANDING_SIZE, STANDING_SIZE)
+    assert containers.obstacles.shape == (OBSTACLES_SIZE, OBSTACLES_SIZE)
     rng = np.random.default_rng(1)
     directions = rng.normal(size=(20000, 3))
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-    found = sample_octahedral(containers.standing[..., None].astype(np.float32), directions)[:, 0]
-    wanted = standing_at("port_gate", directions, 0.0)
-    width = 4 / (STANDING_SIZE - 2 * BORDER)
+    found = sample_octahedral(containers.obstacles[..., None].astype(np.float32), directions)[:, 0]
+    wanted = obstacle_at("port_gate", directions, 0.0)
+    width = 4 / (OBSTACLES_SIZE - 2 * BORDER)
     around = [
-        standing_at("port_gate", directions + width * rng.normal(size=3), 0.0) for _ in range(24)
+        obstacle_at("port_gate", directions + width * rng.normal(size=3), 0.0) for _ in range(24)
     ]
     clear = (np.array(around) == wanted).all(axis=0)
     assert 0.5 < clear.mean() < 1
