@@ -95,6 +95,13 @@ def test_letters_on_flats_and_their_frames_keep_apart_in_all_fonts_and_sizes():
     assert pitched > 30
 
 
+def test_no_size_of_letters_leaves_an_end_wall_without_identifier():
+    for cap_mm in (100, 140, 160, 180):
+        generator = Generator(Config.from_values({"markings": {"cap_mm": cap_mm}}), seed=1)
+        for index in range(40):
+            assert identifiers([generator.scene(index)], "no_door"), (cap_mm, index)
+
+
 def test_columns_have_gaps_between_owner_code_serial_and_check_digit(scenes):
     columns = [decal for decal in identifiers(scenes) if decal.vertical]
     assert len(columns) > 20

@@ -24,8 +24,8 @@ class IdentifierConfig:
             owner_codes is given. Most containers of a line are leased and have other codes.
         check_digit_box: Probability of the frame around the check digit.
         rib_pitch: Probability that the letters of rows or a block on a long side are spaced by half
-            waves, one on each flat. On the end without doors, all are, as the flanks of most such
-            walls are steep. Where letters would touch, they are smaller or have another layout.
+            waves, one on each flat. On the end without doors, all are where they fit, as the flanks
+            of most such walls are steep.
         painted_over: Probability that a container has an older identifier under a patch of fresh
             paint, below or beside the present one. Its letters may show faintly through the paint
             and have no label.

@@ -78,6 +78,7 @@ def _forms(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generator) -> li
         others.remove("column")
     for name in (first, *others):
         made.append(_form(name, config.cap_mm.lo, boxed, pitch if steep else 0.0, rng))
+    made += [replace(form, pitch_mm=0.0) for form in made if form.layout != "column"]
     tallest = tenth((sheet.size[1] - 2 * EDGE_MM) / _COLUMN_CAPS)
     return [
         replace(form, cap_mm=max(min(form.cap_mm, tallest), config.cap_mm.lo))
@@ -134,7 +135,7 @@ def _in_one_piece(
         return None
     text, lettering = _written(style, form)
     if spaced:
-        center = _on_flats(sheet, lettering, form.pitch_mm, number, rng)
+        center = _on_flats(sheet, lettering, number, rng)
         return placed(text, sheet, center) if center else None
     center = None
     if form.layout == "column" and sheet.face == "no_door":
@@ -178,15 +179,13 @@ def _across_bar(
     return None
 
 
-def _on_flats(
-    sheet: Sheet, text: Lettering, pitch_mm: float, number: int, rng: np.random.Generator
-) -> Vec2 | None:
+def _on_flats(sheet: Sheet, text: Lettering, number: int, rng: np.random.Generator) -> Vec2 | None:
     """Place letters with a pitch of half a wave on the flats, high and near the right end.
 
     The second text of a wall is near the left end.
     """
     first = (text.glyphs[0].x0 + text.glyphs[0].x1) / 2
-    flat = sum(sheet.flats[0]) / 2
+    flat, pitch_mm = sum(sheet.flats[0]) / 2, sheet.half_wave_mm
     least, most = EDGE_MM, sheet.size[0] - EDGE_MM - text.size_mm[0]
     low = math.ceil((least + first - flat) / pitch_mm)
     high = math.floor((most + first - flat) / pitch_mm)
