@@ -6,7 +6,6 @@
 #include "lookups.constants"
 #include "units.constants"
 #include "variant.constants"
-#include "ground.block"
 #include "view.block"
 #include "display_color.glsl"
 #include "environment_map.glsl"
