@@ -15,7 +15,7 @@ from fastgen.render.gl import open_context
 TABLE = {
     "art": (artwork, 7, 18.11144, 41.93788, 36.35176),
     "container": (container, 9, 12.77836, 33.3579, 30.57862),
-    "container-map": (container_map, 2, 14.84011, 16.39263, 8.13662),
+    "container-map": (container_map, 3, 14.84011, 16.39247, 8.13648),
     "dfg": (reflectance, 1, 7.62462, 0.34701, 0.17011),
     "environment": (environment, 1, 14.18415, 21.35128, 20.6178),
     "folds": (sheet_folds, 1, 9.39366, 27.73207, 25.70046),

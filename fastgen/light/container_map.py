@@ -22,9 +22,9 @@ from fastgen.files import disk_cache
 from fastgen.files.plain_file import read_plain
 from fastgen.light.environment import to_map_frame
 from fastgen.light.hdri import LARGEST_FILE, MAX_WIDTH, MIN_WIDTH
-from fastgen.light.octahedral import BORDER, fill_border, octahedral_decode
+from fastgen.light.octahedral import resample_octahedral
 
-VERSION = 2  # raise when the stored arrays change
+VERSION = 3  # raise when the stored arrays change
 
 OTHER = 65535
 """Value of obstacles that are no containers."""
@@ -149,7 +149,8 @@ def _decoded(data: bytes, path: Path) -> disk_cache.Arrays:
     numbers = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if numbers is None or numbers.shape != (height, width):
         raise AssetError(f"{path}: a damaged PNG")
-    obstacles = _obstacles(numbers > 0)
+    mask = np.repeat((numbers > 0)[..., None].astype(np.float32), 3, axis=-1)
+    shares = resample_octahedral(mask, OBSTACLES_SIZE, _OBSTACLE_SAMPLES)[..., 0]
     numbers[numbers == OTHER] = 0
     used = np.flatnonzero(numbers.any(axis=1))
     first, limit = (int(used[0]), int(used[-1]) + 1) if len(used) else (0, 0)
@@ -159,25 +160,8 @@ def _decoded(data: bytes, path: Path) -> disk_cache.Arrays:
         "rows": rows,
         "first_row": np.array([first - 1], np.int64),
         "points": _points(rows, first - 1),
-        "obstacles": obstacles,
+        "obstacles": np.rint(255 * shares).astype(np.uint8),
     }
-
-
-def _obstacles(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Return ContainerMap.obstacles of a mask of obstacles, bool [H, 2 H]."""
-    per_radian = mask.shape[1] / (2 * np.pi)
-    inner = OBSTACLES_SIZE - 2 * BORDER
-    step = (np.arange(inner * _OBSTACLE_SAMPLES) + 0.5) / (inner * _OBSTACLE_SAMPLES)
-    shares = np.zeros((OBSTACLES_SIZE, OBSTACLES_SIZE, 1), np.float32)
-    for row, lines in enumerate(np.split(step, inner), start=BORDER):
-        x, y, z = np.moveaxis(octahedral_decode(np.stack(np.meshgrid(step, lines), -1)), -1, 0)
-        column = ((np.pi - np.arctan2(y, x)) * per_radian).astype(np.int64) % mask.shape[1]
-        line = (np.arctan2(np.hypot(x, y), z) * per_radian).astype(np.int64)
-        found = mask[np.minimum(line, len(mask) - 1), column]
-        texels = found.reshape(_OBSTACLE_SAMPLES, inner, _OBSTACLE_SAMPLES).mean(axis=(0, 2))
-        shares[row, BORDER:-BORDER, 0] = texels
-    fill_border(shares)
-    return np.asarray(np.rint(255 * shares[..., 0]), np.uint8)
 
 
 def _points(rows: NDArray[np.uint16], first_row: int) -> NDArray[np.float32]:
