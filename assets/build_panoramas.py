@@ -7,12 +7,12 @@
 Run by hand. Needs Python 3.11, `bpy` 4.5, `OpenEXR` and OpenCV. The package panoramas/ contains the
 port: shapes, materials, models, layout and sky. Cycles traces the objects on the ground. Haze, sky
 and the sun's disc are added from exact maps afterwards, so that the disc keeps its energy and the
-sky has no noise. Beside each panorama, NAME.containers.png numbers the containers that it shows, and marks
-other obstacles.
+sky has no noise. Beside each panorama, NAME.containers.png numbers the containers that it shows,
+and marks other obstacles.
 
-The night of the aisle and the dusk at the rails were rendered with --samples 16. The night of the gate is not part
-of the package, because denoising leaves red stains on its ground. Render it with `--out` into a
-folder for `--hdri`.
+The night of the aisle and the dusk at the rails were rendered with --samples 16. The night of the
+gate is not part of the package, because denoising leaves red stains on its ground. Render it with
+`--out` into a folder for `--hdri`.
 """
 
 import argparse

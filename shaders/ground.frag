@@ -64,7 +64,6 @@ vec4 seen_color(vec3 ray, out float depth) {
 #endif
 #endif
 #if GROUND_FADES && GROUND_PLANE && LAYER == LAYER_ALL
-    if (isinf(depth)) share = 0.0;
     if (share < 1.0) {
         vec3 behind = exposure * background(ray);
         color = share > 0.0 ? mix(behind, color, share) : behind;

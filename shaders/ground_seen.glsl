@@ -13,11 +13,10 @@ uniform sampler2D obstacle_map;   // Share of containers and other obstacles; oc
 
 float seen_plane(vec3 ray, out vec3 at, out float share) {
     float depth = plane_depth(ray, at);
-    share = 1.0;
+    share = isinf(depth) ? 0.0 : 1.0;
 #if GROUND_FADES
-    if (isinf(depth)) return depth;
     float away_m = length(at.xy);
-    if (away_m < ground_clear_m) return depth;
+    if (isinf(depth) || away_m < ground_clear_m) return depth;
     vec2 uv = bordered(octahedral(to_environment(ray)), float(textureSize(obstacle_map, 0).x));
     float hidden = textureLod(obstacle_map, uv, 0.0).r *
                    smoothstep(ground_clear_m, 1.6 * ground_clear_m, away_m);

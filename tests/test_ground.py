@@ -126,7 +126,7 @@ def prop_depth_mm(camera, prop):
 
 @pytest.mark.parametrize("camera", CAMERAS, ids=lambda c: c.name)
 def test_depth_of_plane_and_props_equals_algebra(generator, scene, camera):
-    open_place = EnvironmentView("city", YAW_DEG)  # without a map of what stands there
+    open_place = EnvironmentView("city", YAW_DEG)  # it has no container map
     bare = without_container(replace(scene, props=PROPS, environment=open_place))
     depths = [plane_depth_mm(camera, GROUND), *(prop_depth_mm(camera, prop) for prop in PROPS)]
     seen, expected = np.argmin(depths, axis=0), np.min(depths, axis=0) / 1e3

@@ -53,6 +53,11 @@ class Form:
     column_gap_mm: float = 0.0
     pitch_mm: float = 0.0
 
+    @property
+    def spaced(self) -> bool:
+        """Whether the letters of lines have a pitch."""
+        return self.layout != "column" and self.pitch_mm > 0
+
 
 def identifier_lines(identifier: Identifier, form: Form) -> tuple[str, ...]:
     """Return the lines of an identifier in reading order."""
@@ -73,7 +78,7 @@ def identifier_parts(identifier: Identifier, form: Form, font: Font) -> tuple[Te
     Returns:
         The four parts. The lower left corner of their common box is at (0, 0).
     """
-    if form.pitch_mm and form.layout != "column":
+    if form.spaced:
         return _spaced(identifier, form, font)
     place = {"rows": _rows, "block": _block, "column": _column}[form.layout]
     return place(identifier, form, font)

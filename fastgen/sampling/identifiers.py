@@ -78,7 +78,7 @@ def _forms(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generator) -> li
         others.remove("column")
     for name in (first, *others):
         made.append(_form(name, config.cap_mm.lo, boxed, pitch if steep else 0.0, rng))
-    made += [replace(form, pitch_mm=0.0) for form in made if form.layout != "column"]
+    made += [replace(form, pitch_mm=0.0) for form in made if form.spaced]
     tallest = tenth((sheet.size[1] - 2 * EDGE_MM) / _COLUMN_CAPS)
     return [
         replace(form, cap_mm=max(min(form.cap_mm, tallest), config.cap_mm.lo))
@@ -129,14 +129,14 @@ def _in_one_piece(
     sheet: Sheet, style: Style, form: Form, number: int, rng: np.random.Generator
 ) -> Decal | None:
     """Place an identifier at the upper right or, if it is the second one, at the left."""
-    spaced = form.layout != "column" and form.pitch_mm > 0
-    touching = least_pitch_mm(style.identifier, form, style.font) + _LEAST_GAP_CAPS * form.cap_mm
-    if spaced and form.pitch_mm < touching:
-        return None
-    text, lettering = _written(style, form)
-    if spaced:
+    if form.spaced:
+        least = least_pitch_mm(style.identifier, form, style.font) + _LEAST_GAP_CAPS * form.cap_mm
+        if form.pitch_mm < least:
+            return None
+        text, lettering = _written(style, form)
         center = _on_flats(sheet, lettering, number, rng)
         return placed(text, sheet, center) if center else None
+    text, lettering = _written(style, form)
     center = None
     if form.layout == "column" and sheet.face == "no_door":
         center = _on_flat(sheet, lettering, rng)
