@@ -15,7 +15,6 @@ import os
 import statistics
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 os.environ.setdefault("LP_NUM_THREADS", "0")  # one thread, like a worker of `fastgen generate`
@@ -58,8 +57,7 @@ def damages_of(scene: Scene) -> list[str]:
 
 def seen_in(generator: Generator, scene: Scene) -> list[Seen]:
     """Return the damages of a scene that an image shows, each as in its best image."""
-    neighbours = tuple(replace(each, damages=()) for each in scene.neighbours)
-    whole = replace(scene, damages=(), neighbours=neighbours)
+    whole = scene.undamaged()
     best: dict[int, Seen] = {}
     for camera in scene.cameras:
         damaged = generator.render(scene=scene, camera=camera.name)

@@ -26,7 +26,7 @@ from typing import Any
 os.environ.setdefault("LP_NUM_THREADS", "0")  # one thread, like a worker of `fastgen generate`
 
 import numpy as np
-from rendered_crops import aimed
+from aimed_cameras import aimed
 from reporting import origin, parse_size, save
 
 from fastgen import Config, Generator
@@ -82,7 +82,7 @@ def change(generator: Generator, scene: Scene, damage: Damage, camera: Camera) -
     item = next(o for o in with_it.objects if o.class_name == damage.kind)
     if item.area < 60:
         return None
-    without = generator.render(scene=replace(scene, damages=()), camera=camera)
+    without = generator.render(scene=scene.undamaged(), camera=camera)
     mask = with_it.damage == item.id
     difference = with_it.image[mask].astype(int) - without.image[mask].astype(int)
     return float(np.abs(difference).mean())
@@ -116,7 +116,7 @@ def cost(quality: str, size: tuple[int, int], scenes: int) -> dict[str, float]:
     with Generator(config, seed=6, size=size, quality=quality) as generator:
         for index in range(scenes):
             scene = generator.scene(index)
-            whole = replace(scene, damages=())
+            whole = scene.undamaged()
             for camera in scene.cameras:
                 damaged, undamaged = times_ms(generator, (scene, whole), camera.name)
                 ratios.append(damaged / undamaged)

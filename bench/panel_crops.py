@@ -1,14 +1,15 @@
 """Square crops of walls with and without damage, and square crops in general."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import cv2
 import numpy as np
+from aimed_cameras import Views, aimed
 from numpy.typing import NDArray
 
-from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES
+from fastgen import Config, Generator
 from fastgen.sample import Sample
+from fastgen.scene import Scene
 
 Pixels = NDArray[np.uint8]
 """RGB picture [H, W, 3]."""
@@ -19,37 +20,83 @@ PANEL_PX = 80
 MARGIN = 0.1
 """Total margin of a marker's crop, as a share of its box."""
 
+DAMAGED = Config.from_values(
+    {
+        "damage": {
+            "probability": 1,
+            "count": [2, 5],
+            "kinds": ["axis", "concave", "dented", "perforation", "scrape", "rust_through"],
+            "faces": ["front", "back", "no_door", "roof"],
+            "toward_cameras": 0,
+        },
+        "markings": {"marked_containers": 0.15},
+        "spreader": {"probability": 0},
+        "environment": {"weights": dict(Config.preset("gate").environment.weights)},
+    },
+    base=Config.preset("crane"),
+)
+"""Damaged containers in the daylight of the preset `gate`. Few of their walls have markers, as in
+photographs of damages."""
 
-def panels_of(sample: Sample, rng: np.random.Generator) -> list[tuple[Pixels, str]]:
-    """Return a square around each damage, and as large a square of undamaged container."""
-    damaged = np.isin(sample.damage, np.array(DAMAGE_VALUES))
-    height, width = damaged.shape
-    found = []
-    for item in sample.objects:
-        if item.class_name not in DAMAGE_CLASSES or item.bbox is None:
-            continue
-        if item.area < 60 or item.visible_fraction < 0.5:
-            continue
-        side = max(item.bbox[2] - item.bbox[0], item.bbox[3] - item.bbox[1]) * float(
-            rng.uniform(1.2, 3.0)
-        )
-        side = min(max(side, 40.0), 0.9 * min(height, width))
-        middle = np.array([item.bbox[0] + item.bbox[2], item.bbox[1] + item.bbox[3]]) / 2
-        corner = middle - side / 2 + rng.uniform(-0.15, 0.15, 2) * side
-        corner = corner.clip(0, (width - side, height - side))
-        found.append((_square(sample.image, corner, side), item.class_name))
-        for _ in range(12):
-            x, y = rng.uniform(0, (width - side, height - side))
-            area = np.s_[int(y) : int(y + side), int(x) : int(x + side)]
-            if (sample.ids[area] > 0).mean() > 0.8 and not damaged[area].any():
-                found.append((_square(sample.image, (x, y), side), ""))
-                break
+_WALLS = Views((-62, 62), (-20, 30), (-8, 8), (1800, 9000))
+_ROOF = Views((-55, 55), (-55, 55), (-8, 8), (1800, 9000))
+"""Damages are photographed from all sides; at 62 degrees corrugation hides half of itself."""
+
+_LEAST_PX, _LEAST_SHOWN = 60, 0.5
+_LEAST_SIDE_PX = 40.0
+_LEAST_CONTAINER = 0.3
+
+
+def panels_of(
+    generator: Generator, scene: Scene, rng: np.random.Generator
+) -> list[tuple[Pixels, str]]:
+    """Render a square around each damage of a scene, and the same square without any damage.
+
+    Everything else is equal in both, so a network can tell them apart by nothing but the damage.
+
+    Returns:
+        Crops [PANEL_PX, PANEL_PX, 3] with the damage class, or '' for those without damage.
+    """
+    found: list[tuple[Pixels, str]] = []
+    whole = scene.undamaged()
+    for damage in scene.damages:
+        size = min(max(damage.size_mm), 1500.0) * float(rng.uniform(1.6, 3.5))
+        faces = [face for face in damage.face.split(".") if face != "underside"]  # two at an edge
+        face = faces[int(rng.integers(len(faces)))]
+        views = _ROOF if face == "roof" else _WALLS
+        camera = aimed(scene, face, np.array(damage.origin_mm), size, rng, views)
+        damaged = generator.render(scene=scene, camera=camera)
+        squares = list(_squares(damaged, rng))
+        if squares:
+            undamaged = generator.render(scene=whole, camera=camera)
+            for square, kind in squares:
+                found += [(_cut(damaged, square), kind), (_cut(undamaged, square), "")]
     return found
 
 
-def _square(image: Pixels, corner: Any, side: float) -> Pixels:
-    x, y = corner
-    return square_crop(image, (x, y, x + side, y + side), PANEL_PX, margin=0.0)
+def _squares(
+    sample: Sample, rng: np.random.Generator
+) -> Iterator[tuple[tuple[float, float, float], str]]:
+    """Yield left, top and side of a square around each visible damage, and its class."""
+    height, width = sample.damage.shape
+    for item in sample.objects:
+        if item.class_name not in DAMAGED.damage.kinds or item.bbox is None:
+            continue
+        if item.area < _LEAST_PX or item.visible_fraction < _LEAST_SHOWN:
+            continue
+        x0, y0, x1, y1 = item.bbox
+        side = max(x1 - x0, y1 - y0) * float(rng.uniform(1.1, 2.6))
+        side = min(max(side, _LEAST_SIDE_PX), 0.95 * min(height, width))
+        middle = np.array([x0 + x1, y0 + y1]) / 2 + rng.uniform(-0.15, 0.15, 2) * side
+        x, y = (middle - side / 2).clip(0, (width - side, height - side)).tolist()
+        area = np.s_[int(y) : int(y + side), int(x) : int(x + side)]
+        if (sample.ids[area] > 0).mean() >= _LEAST_CONTAINER:
+            yield (x, y, side), item.class_name
+
+
+def _cut(sample: Sample, square: tuple[float, float, float]) -> Pixels:
+    x, y, side = square
+    return square_crop(sample.image, (x, y, x + side, y + side), PANEL_PX, margin=0.0)
 
 
 def square_crop(image: Pixels, box: Sequence[float], side: int, margin: float = MARGIN) -> Pixels:

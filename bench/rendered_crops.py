@@ -8,18 +8,18 @@ its second and further views cost a fifth of the first.
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
+from aimed_cameras import aimed, place_mm
 from numpy.typing import NDArray
-from panel_crops import Pixels, panels_of, square_crop
+from panel_crops import DAMAGED, Pixels, panels_of, square_crop
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
-from fastgen.config.cameras import direction_from, face_frame
 from fastgen.decals.glyphs import BOX
 from fastgen.decals.lettering import TILE_BASELINE_CAPS
 from fastgen.geometry.damage_law import deform
@@ -52,22 +52,7 @@ _LETTERED = Config.from_values(
 """More markers than the preset, and the sensor effects of the preset `crane` that are not part of a
 scene's surroundings."""
 
-_DAMAGED = Config.from_values(
-    {
-        "damage": {
-            "probability": 0.9,
-            "count": [2, 5],
-            "kinds": ["axis", "concave", "dented", "perforation"],
-        },
-        "markings": {"marked_containers": 0.15},
-        "environment": {"weights": dict(Config.preset("gate").environment.weights)},
-    },
-    base=Config.preset("crane"),
-)
-"""More damages than the preset `crane`, in the daylight of the preset `gate`. Few of its walls
-have markers, as in photographs of damages."""
-
-TRAINING = {"markers": _LETTERED, "texts": _LETTERED, "panels": _DAMAGED}
+TRAINING = {"markers": _LETTERED, "texts": _LETTERED, "panels": DAMAGED}
 """Distribution of the scenes by the kind of crop."""
 
 _FACES = ("front", "back", "door", "no_door")
@@ -166,12 +151,13 @@ def _crops_of(seed: int, wanted: tuple[str, ...], scenes: Iterable[int]) -> Crop
             for index in scenes:
                 scene = generator.scene(index)
                 rng = stream(seed, index, f"gap.{kind}")
+                if kind == "panels":
+                    made.panels += panels_of(generator, scene, rng)
+                    continue
                 for camera in _cameras(scene, kind, rng):
                     sample = generator.render(scene=scene, camera=camera)
                     if kind == "texts":
                         made.texts += texts_of(sample)
-                    elif kind == "panels":
-                        made.panels += panels_of(sample, rng)
                     else:
                         pairs = marker_objects(sample)
                         made.markers += [
@@ -182,13 +168,7 @@ def _crops_of(seed: int, wanted: tuple[str, ...], scenes: Iterable[int]) -> Crop
 
 
 def _cameras(scene: Scene, kind: str, rng: np.random.Generator) -> Iterator[Camera]:
-    """Yield cameras that are aimed at the scene's markers, identifiers or damages."""
-    if kind == "panels":
-        for damage in scene.damages:
-            if damage.face in _FACES:
-                size = min(max(damage.size_mm), 1500.0) * float(rng.uniform(2.0, 3.5))
-                yield aimed(scene, damage.face, np.array(damage.origin_mm), size, rng)
-        return
+    """Yield cameras that are aimed at the scene's markers or identifiers."""
     for face in _FACES:
         if kind == "texts":
             for decal in scene.decals:
@@ -201,43 +181,6 @@ def _cameras(scene: Scene, kind: str, rng: np.random.Generator) -> Iterator[Came
             decal = markers[int(rng.integers(len(markers)))]
             size = float(np.exp(rng.uniform(np.log(900), np.log(3500))))
             yield aimed(scene, face, place_mm(scene, decal), size, rng)
-
-
-def place_mm(scene: Scene, decal: Decal) -> NDArray[np.float64]:
-    """Return the position [3] of a decal's centre in the container frame."""
-    mesh = SHAPES.container(scene.container.kind, scene.container.profiles)
-    places, _ = mesh.sheet_to_surface(decal.face, decal.center_mm)
-    place: NDArray[np.float64] = places[0]
-    return place
-
-
-def aimed(
-    scene: Scene, face: str, target_mm: NDArray[Any], size_mm: float, rng: np.random.Generator
-) -> Camera:
-    """Return a camera a few metres away that sees `size_mm` of a face around a point.
-
-    Exposure and sensor effects are those of one of the scene's cameras.
-    """
-    frame = face_frame(face, scene.container.kind)
-    angles = float(rng.uniform(-30, 30)), float(rng.uniform(-15, 25))
-    distance = float(rng.uniform(1800, 6000))
-    position = target_mm + direction_from(frame, *angles) * distance
-    like = scene.cameras[int(rng.integers(len(scene.cameras)))]
-    return replace(
-        like,
-        position_mm=_point(position),
-        target_mm=_point(target_mm),
-        focal_mm=like.sensor_width_mm * distance / size_mm,
-        roll_deg=float(rng.uniform(-4, 4)),
-        lens=None,
-    )
-
-
-def zoomed(camera: Camera, target_mm: NDArray[Any], px_per_mm: float, width_px: int) -> Camera:
-    """Return a camera at the same place, turned to a point, with a given scale there."""
-    distance = float(np.linalg.norm(np.array(camera.position_mm) - target_mm))
-    focal = px_per_mm * distance * camera.sensor_width_mm / width_px
-    return replace(camera, target_mm=_point(target_mm), focal_mm=focal, lens=None)
 
 
 def marker_objects(sample: Sample) -> list[tuple[str, tuple[float, float, float, float]]]:
@@ -346,8 +289,3 @@ def _layout(letters_px: NDArray[np.float64]) -> str:
 
 def _sides(box: Sequence[float]) -> tuple[float, float]:
     return box[2] - box[0], box[3] - box[1]
-
-
-def _point(values: NDArray[Any]) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return x, y, z

@@ -5,16 +5,10 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from aimed_cameras import place_mm, zoomed
 from numpy.typing import NDArray
 from panel_crops import Pixels
-from rendered_crops import (
-    Text,
-    in_processes,
-    marker_objects,
-    place_mm,
-    texts_of,
-    zoomed,
-)
+from rendered_crops import Text, in_processes, marker_objects, texts_of
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES

@@ -92,6 +92,24 @@ def test_pixels_equal_the_nearest_hit_of_rays_at_each_container(generator, scene
     assert np.quantile(np.abs(sample.depth[both] / found.depth_m[both] - 1), 0.995) < 1e-5
 
 
+def test_an_undamaged_scene_differs_only_in_its_damages(generator, scene):
+    whole = scene.undamaged()
+    damaged, undamaged = (
+        generator.render(scene=each, camera=CAMERAS[0]) for each in (scene, whole)
+    )
+    assert (damaged.damage >= 200).any()
+    assert not (undamaged.damage >= 200).any()
+    ray = oracle_scene.truth(whole, view_of(CAMERAS[0], SIZE), THRESHOLD_MM)
+    assert ((undamaged.ids != ray.ids) & ~oracle.near_edge(ray.ids)).sum() == 0
+    changed = (damaged.image.astype(int) - undamaged.image).any(axis=-1)
+    assert 0 < changed.mean() < 0.5
+    parts = ("decals", "surface", "container", "seals")
+    for part in parts:
+        assert getattr(whole, part) == getattr(scene, part)
+        for before, after in zip(scene.neighbours, whole.neighbours, strict=True):
+            assert getattr(before, part) == getattr(after, part)
+
+
 def own_values(objects, container):
     """Return the values in the damage target of a container and its damages."""
     yield 100 + container.instance

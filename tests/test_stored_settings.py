@@ -21,7 +21,8 @@ from fastgen.torch import (
 
 # Panoramas that version 0.23 lacked.
 ADDED = [
-    *(f"port_{place}" for place in ("gate", "gate_rain", "aisle", "aisle_fog", "aisle_night")),
+    *(f"port_{place}" for place in ("gate", "gate_rain", "gate_golden")),
+    *(f"port_{place}" for place in ("aisle", "aisle_fog", "aisle_night")),
     *(f"port_{place}" for place in ("rail", "rail_rain", "rail_dusk")),
 ]
 

@@ -102,7 +102,7 @@ _HOURS = {
 tenth are at dusk, and the rest at night. This is a choice; `fastgen fit` finds the weights of a
 camera."""
 
-_GATES = {"port_gate": 14.0, "port_gate_rain": 9.0}
+_GATES = {"port_gate": 14.0, "port_gate_rain": 9.0, "port_gate_golden": 4.0}
 _YARDS = {
     "port_aisle": 9.0,
     "port_aisle_fog": 5.0,

@@ -8,8 +8,9 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.gl import GLContext
 from fastgen.render.glyph_runs import all_glyphs
 from fastgen.render.material_tables import Textures, material_tables
-from fastgen.render.recent_cache import CACHED_CONTAINERS, ReleasingCache
+from fastgen.render.recent_cache import ReleasingCache
 from fastgen.render.scene_resources import DecalTextures, Prints, SceneResources
+from fastgen.scene.limits import MAX_NEIGHBOURS
 
 
 class MaterialTextures:
@@ -28,8 +29,15 @@ class MaterialTextures:
         bundled = art_layers()
         layers = {**bundled, **{name: len(bundled) + i for i, name in enumerate(own.art)}}
         self._prints = Prints(layers, all_glyphs(own.fonts))
-        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(CACHED_CONTAINERS)
+        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(2 + MAX_NEIGHBOURS)
         self.shared = material_tables(gl, self._prints.glyphs, list(own.art.values()))
+
+    def drop_old(self, containers: int) -> None:
+        """Drop all but the `containers` that were used last and one more, to save memory.
+
+        The tables of one container take about 3 MB.
+        """
+        self._scenes.shrink(1 + containers)
 
     def resources(self, prepared: PreparedScene) -> SceneResources:
         """Return what is kept for a scene."""

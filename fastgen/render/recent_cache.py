@@ -4,11 +4,6 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from fastgen.scene.limits import MAX_NEIGHBOURS
-
-CACHED_CONTAINERS = 2 + MAX_NEIGHBOURS
-"""Number of containers whose tables are cached: those of one scene, and one more."""
-
 
 class _Releasable(Protocol):
     def release(self) -> None: ...
@@ -38,10 +33,14 @@ class RecentCache(Generic[T]):
         """
         if key not in self._items:
             self._items[key] = make()
-            if len(self._items) > self._capacity:
-                self._dropped(self._items.popitem(last=False)[1])
+            self.shrink(self._capacity)
         self._items.move_to_end(key)
         return self._items[key]
+
+    def shrink(self, most: int) -> None:
+        """Drop the least recently used values until there are at most `most`."""
+        while len(self._items) > most:
+            self._dropped(self._items.popitem(last=False)[1])
 
     def _dropped(self, value: T) -> None:
         """Handle a value that was dropped."""

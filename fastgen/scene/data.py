@@ -6,7 +6,7 @@ the door. Colors are linear Rec. 709 albedo in 0..1.
 """
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
@@ -303,6 +303,15 @@ class Scene:
             if camera.name == name:
                 return camera
         raise KeyError(f"no camera {name!r}; this scene has {[c.name for c in self.cameras]}")
+
+    def undamaged(self) -> "Scene":
+        """Return the same scene with all its containers undamaged.
+
+        Rendered by the same camera, the two scenes differ in nothing but the damages, the rust and
+        scrapes that belong to them, and their light and shadows. A decal beside a damage stays.
+        """
+        whole = tuple(replace(each, damages=()) for each in self.neighbours)
+        return replace(self, damages=(), neighbours=whole)
 
     def _repr_html_(self) -> str:
         """Return a table of the parts of the scene, for notebooks."""
