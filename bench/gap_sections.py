@@ -8,6 +8,7 @@ them.
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import cv2
@@ -24,7 +25,7 @@ from crop_statistics import (
 from gap_renders import Effort, Renders
 from marker_search import overlap, search, true_scores
 from numpy.typing import NDArray
-from panel_crops import PANEL_PX, Pixels, square_crop
+from panel_crops import PANEL_PX, Pixels, change_of, square_crop
 from real_crops import DAMAGE_KINDS, LAYOUTS, RealCrops
 from rendered_crops import MARKER_PX, Crops
 from text import edit_distance
@@ -50,7 +51,9 @@ Measures = dict[str, Measure]
 
 _BACKGROUND = len(MARKER_CLASSES)
 _RECALL = 0.6
-_HOLE = "perforation"
+_DENTS = ("axis", "concave", "dented")
+_CHANGES = (0, 8, 16, 32, 64, 256)
+_LEAST_PANELS = 5
 _LONGEST = {"photographs": 640, "panels": PANEL_PX, "identifiers": 256}
 
 
@@ -180,13 +183,7 @@ def damage(trial: Trial) -> Measures:
     model = fit_classifier(pixels, classes, 2, trial.effort.damage_steps, trial.seed)
     mine = trial.renders.held_out.panels
     ours = model.shares(np.stack([crop for crop, _ in mine]))[:, 1]
-    kinds = np.array([kind for _, kind in mine])
-    whole = ours[kinds == ""]
-    found: Measures = {
-        "ours, held out, all": auc_interval(ours[kinds != ""], whole),
-        "ours, held out, hole": auc_interval(ours[kinds == _HOLE], whole),
-        "ours, held out, dent": auc_interval(ours[(kinds != "") & (kinds != _HOLE)], whole),
-    }
+    found = _by_kind_and_change(ours.astype(float), mine)
     theirs = trial.real.panels
     damaged, undamaged = (
         model.shares(
@@ -203,6 +200,34 @@ def damage(trial: Trial) -> Measures:
         if chosen.any():
             found[f"theirs, {kind}"] = auc_interval(damaged[chosen], undamaged[chosen])
     return found
+
+
+def _by_kind_and_change(scores: Array, panels: Sequence[tuple[Pixels, str]]) -> Measures:
+    """Return AUCs on our panels by kind of damage, and by how much the damage changes the panel.
+
+    Args:
+        scores: Score [N] of each panel.
+        panels: Pairs of a damaged and the same undamaged panel, one after the other.
+    """
+    damaged, whole = scores[::2], scores[1::2]
+    kinds = np.array([kind for _, kind in panels[::2]])
+    change = np.array(
+        [change_of(a, b) for (a, _), (b, _) in zip(panels[::2], panels[1::2], strict=True)]
+    )
+    groups = {
+        "all": kinds != "",
+        "dent": np.isin(kinds, _DENTS),
+        **{kind: kinds == kind for kind in sorted(set(kinds))},
+        **{
+            f"change of {low:g} to {high:g} levels": (change >= low) & (change < high)
+            for low, high in pairwise(_CHANGES)
+        },
+    }
+    return {
+        f"ours, held out, {name}": auc_interval(damaged[chosen], whole)
+        for name, chosen in groups.items()
+        if chosen.sum() >= _LEAST_PANELS
+    }
 
 
 def image_statistics(trial: Trial) -> Measures:

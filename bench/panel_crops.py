@@ -45,6 +45,7 @@ _ROOF = Views((-55, 55), (-55, 55), (-8, 8), (1800, 9000))
 _LEAST_PX, _LEAST_SHOWN = 60, 0.5
 _LEAST_SIDE_PX = 40.0
 _LEAST_CONTAINER = 0.3
+_BLUR_PX = 1.2
 
 
 def panels_of(
@@ -97,6 +98,20 @@ def _squares(
 def _cut(sample: Sample, square: tuple[float, float, float]) -> Pixels:
     x, y, side = square
     return square_crop(sample.image, (x, y, x + side, y + side), PANEL_PX, margin=0.0)
+
+
+def change_of(damaged: Pixels, undamaged: Pixels) -> float:
+    """Return the mean change of the twentieth of a panel that a damage changes most, in levels.
+
+    Both are blurred by about a pixel, which removes most noise.
+    """
+    blurred = (
+        cv2.GaussianBlur(panel.astype(np.float32), (0, 0), _BLUR_PX)
+        for panel in (damaged, undamaged)
+    )
+    change = np.abs(np.subtract(*blurred)).max(axis=2).ravel()
+    most = len(change) // 20
+    return float(np.partition(change, -most)[-most:].mean())
 
 
 def square_crop(image: Pixels, box: Sequence[float], side: int, margin: float = MARGIN) -> Pixels:

@@ -63,6 +63,11 @@ class Case:
             }
         )
 
+    @property
+    def texel_mm(self) -> float:
+        """Size of the texels that Cycles sees, a quarter of a pixel of the closest camera."""
+        return 3.0
+
     def drawn(self) -> Scene:
         """Sample the scene of the case with the current code."""
         return Generator(self.config, SEED, SIZE).scene(self.number)

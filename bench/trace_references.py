@@ -39,9 +39,6 @@ BACKGROUND_SAMPLES = 16
 Only the environment is visible there: it is smooth, and its light hits nothing on the way.
 """
 
-TEXEL_MM = 3.0
-"""A quarter of a pixel of the closest camera, finer than 320 pixels per side can show."""
-
 
 class Tracer:
     """Renderer of cases with Cycles into a folder, each file once."""
@@ -112,7 +109,7 @@ class Tracer:
             scene = load(case.number).scene if stored else case.drawn()
             aside = glb.with_suffix(".part")
             with Generator(case.config, SEED, SIZE) as generator:
-                export_glb(generator, scene, aside, [scene.camera(case.camera)], TEXEL_MM)
+                export_glb(generator, scene, aside, [scene.camera(case.camera)], case.texel_mm)
             text = json.dumps(json.loads(scene.to_json()))
             glb.with_suffix(".json").write_text(text, encoding="utf-8")
             aside.replace(glb)

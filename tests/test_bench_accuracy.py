@@ -47,7 +47,7 @@ def test_the_scene_of_a_case_has_its_light_damage_and_rust():
 
 
 def test_surrounded_cases_can_be_drawn_and_are_numbered_on():
-    assert [case.number for case in surrounded_cases()] == [32, 33, 34, 35, 36]
+    assert [case.number for case in surrounded_cases()] == [*range(32, 39)]
     for case in surrounded_cases():
         scene = check_scene(case.drawn())
         assert scene.ground is not None

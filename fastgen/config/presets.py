@@ -69,7 +69,12 @@ _OUTDOORS: dict[str, Any] = {
         # damages that no camera sees only cost time
         "toward_cameras": 1.0,
     },
-    "surface": {"color_weights": _FLEET_PAINT},
+    "surface": {
+        "color_weights": _FLEET_PAINT,
+        # most containers at gates have deep colors, and little rust beside their edges
+        "bleach": [0.0, 0.35],
+        "rust_coverage": [0.0, 0.04],
+    },
     "sensor": {
         "defocus": {"probability": 0.15},
         "motion": {"probability": 0.5},
