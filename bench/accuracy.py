@@ -226,7 +226,7 @@ def by_surroundings(results: dict[str, list[Result]]) -> list[str]:
         rows.append([value for r in same for value in (r.measures[3], r.ground)])
         cells = " | ".join(f"{value:.3f}" for value in rows[-1])
         lines.append(f"| {case.number}: {case.name}, {case.light} | {cells} |")
-    means = " | ".join(f"{value:.3f}" for value in np.mean(rows, axis=0))
+    means = " | ".join(f"{value:.3f}" for value in np.nanmean(rows, axis=0))
     return [*lines, f"| mean | {means} |"]
 
 

@@ -1,4 +1,4 @@
-"""Cameras that are aimed at single things on a container from a few metres away."""
+"""Cameras a few metres from a container, aimed at one decal or damage."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -10,26 +10,27 @@ from fastgen.config.cameras import direction_from, face_frame
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.scene import Camera, Decal, Scene
 
-Range = tuple[float, float]
+Limits = tuple[float, float]
 
 
 class Views(NamedTuple):
-    """Ranges of the views of a face.
+    """Ranges of camera positions and rolls relative to a face.
 
     Attributes:
-        azimuth_deg: Angle to the outward axis of the face, to its right.
-        elevation_deg: Angle to the outward axis of the face, upward.
-        roll_deg: Rotation of the image.
+        azimuth_deg: Angle of the camera from the outward axis of the face, positive to the right.
+        elevation_deg: The same angle upward.
+        roll_deg: Clockwise rotation of the image.
         distance_mm: Distance from the target.
     """
 
-    azimuth_deg: Range = (-30, 30)
-    elevation_deg: Range = (-15, 25)
-    roll_deg: Range = (-4, 4)
-    distance_mm: Range = (1800, 6000)
+    azimuth_deg: Limits = (-30, 30)
+    elevation_deg: Limits = (-15, 25)
+    roll_deg: Limits = (-4, 4)
+    distance_mm: Limits = (1800, 6000)
 
 
-AHEAD = Views()
+FRONTAL = Views()
+"""Views nearly along the outward axis."""
 
 
 def place_mm(scene: Scene, decal: Decal) -> NDArray[np.float64]:
@@ -46,11 +47,19 @@ def aimed(
     target_mm: NDArray[Any],
     size_mm: float,
     rng: np.random.Generator,
-    views: Views = AHEAD,
+    views: Views = FRONTAL,
 ) -> Camera:
-    """Return a camera that sees `size_mm` of a face around a point.
+    """Return a camera whose image is `size_mm` wide at the target.
 
     Exposure and sensor effects are those of one of the scene's cameras.
+
+    Args:
+        scene: The scene.
+        face: Face that the angles of `views` refer to.
+        target_mm: Point [3] in the container frame.
+        size_mm: Width of the image at the target.
+        rng: Random generator.
+        views: Ranges of the camera's place.
     """
     frame = face_frame(face, scene.container.kind)
     angles = float(rng.uniform(*views.azimuth_deg)), float(rng.uniform(*views.elevation_deg))

@@ -52,8 +52,12 @@ Measures = dict[str, Measure]
 _BACKGROUND = len(MARKER_CLASSES)
 _RECALL = 0.6
 _DENTS = ("axis", "concave", "dented")
-_CHANGES = (0, 8, 16, 32, 64, 256)
-_LEAST_PANELS = 5
+"""Kinds that the real pictures call a dent."""
+
+_CHANGE_EDGES = (0, 8, 16, 32, 64, 256)
+"""Limits of the groups by change_of, in 8-bit levels."""
+
+_MIN_PANELS = 5
 _LONGEST = {"photographs": 640, "panels": PANEL_PX, "identifiers": 256}
 
 
@@ -176,7 +180,7 @@ def false_markers(trial: Trial) -> Measures:
 
 
 def damage(trial: Trial) -> Measures:
-    """Return the AUC of damaged against undamaged panels."""
+    """Return AUCs of damaged against undamaged panels, on ours and theirs."""
     panels = trial.crops.panels
     pixels = np.stack([crop for crop, _ in panels])
     classes = np.array([int(kind != "") for _, kind in panels])
@@ -205,9 +209,11 @@ def damage(trial: Trial) -> Measures:
 def _by_kind_and_change(scores: Array, panels: Sequence[tuple[Pixels, str]]) -> Measures:
     """Return AUCs on our panels by kind of damage, and by how much the damage changes the panel.
 
+    Each group is compared with all undamaged panels.
+
     Args:
         scores: Score [N] of each panel.
-        panels: Pairs of a damaged and the same undamaged panel, one after the other.
+        panels: Damaged panels, each followed by the same panel without damage.
     """
     damaged, whole = scores[::2], scores[1::2]
     kinds = np.array([kind for _, kind in panels[::2]])
@@ -215,18 +221,18 @@ def _by_kind_and_change(scores: Array, panels: Sequence[tuple[Pixels, str]]) -> 
         [change_of(a, b) for (a, _), (b, _) in zip(panels[::2], panels[1::2], strict=True)]
     )
     groups = {
-        "all": kinds != "",
+        "all": np.ones(len(kinds), bool),
         "dent": np.isin(kinds, _DENTS),
         **{kind: kinds == kind for kind in sorted(set(kinds))},
         **{
             f"change of {low:g} to {high:g} levels": (change >= low) & (change < high)
-            for low, high in pairwise(_CHANGES)
+            for low, high in pairwise(_CHANGE_EDGES)
         },
     }
     return {
         f"ours, held out, {name}": auc_interval(damaged[chosen], whole)
         for name, chosen in groups.items()
-        if chosen.sum() >= _LEAST_PANELS
+        if chosen.sum() >= _MIN_PANELS
     }
 
 
@@ -262,7 +268,10 @@ def _groups(trial: Trial) -> Iterator[tuple[str, list[Pixels], list[Pixels]]]:
         yield "photographs, preset gate", [view.image for view in gate], list(real.photos)
     if real.panels:
         theirs = [p for pair in real.panels for p in (pair.damaged, pair.undamaged)]
-        yield "panels", [crop for crop, _ in trial.renders.held_out.panels], theirs
+        # one panel of each pair, damaged and undamaged in turn
+        pairs = trial.renders.held_out.panels
+        ours = [pairs[k + k // 2 % 2][0] for k in range(0, len(pairs), 2)]
+        yield "panels", ours, theirs
     if real.identifiers:
         ours = [text.framed() for text in trial.renders.texts]
         yield "identifiers", ours, [r.pixels for r in real.identifiers]

@@ -9,8 +9,11 @@ The images themselves need not be kept. Prints the error that compression adds.
 
 import argparse
 import json
+import sys
 from pathlib import Path
 from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 import OpenEXR

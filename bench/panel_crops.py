@@ -35,28 +35,30 @@ DAMAGED = Config.from_values(
     },
     base=Config.preset("crane"),
 )
-"""Damaged containers in the daylight of the preset `gate`. Few of their walls have markers, as in
+"""Damaged containers in the light of the preset `gate`. Few of their walls have markers, as in
 photographs of damages."""
 
 _WALLS = Views((-62, 62), (-20, 30), (-8, 8), (1800, 9000))
 _ROOF = Views((-55, 55), (-55, 55), (-8, 8), (1800, 9000))
-"""Damages are photographed from all sides; at 62 degrees corrugation hides half of itself."""
+"""Damages are photographed from many directions. At 62 degrees, half of the sheet is hidden."""
 
-_LEAST_PX, _LEAST_SHOWN = 60, 0.5
-_LEAST_SIDE_PX = 40.0
-_LEAST_CONTAINER = 0.3
+_MIN_AREA_PX, _MIN_VISIBLE = 60, 0.5
+_MIN_SIDE_PX = 40.0
+_MIN_CONTAINER_SHARE = 0.3
 _BLUR_PX = 1.2
 
 
 def panels_of(
     generator: Generator, scene: Scene, rng: np.random.Generator
 ) -> list[tuple[Pixels, str]]:
-    """Render a square around each damage of a scene, and the same square without any damage.
+    """Render squares around the damages of a scene, each with and without the damages.
 
-    Everything else is equal in both, so a network can tell them apart by nothing but the damage.
+    Everything else is equal in both, so only the damage distinguishes them. One camera is aimed at
+    each damage; other damages that it sees get a square too.
 
     Returns:
-        Crops [PANEL_PX, PANEL_PX, 3] with the damage class, or '' for those without damage.
+        Crops [PANEL_PX, PANEL_PX, 3] and their damage class. Each damaged crop is followed by the
+        same crop without damage, whose class is ''.
     """
     found: list[tuple[Pixels, str]] = []
     whole = scene.undamaged()
@@ -83,15 +85,15 @@ def _squares(
     for item in sample.objects:
         if item.class_name not in DAMAGED.damage.kinds or item.bbox is None:
             continue
-        if item.area < _LEAST_PX or item.visible_fraction < _LEAST_SHOWN:
+        if item.area < _MIN_AREA_PX or item.visible_fraction < _MIN_VISIBLE:
             continue
         x0, y0, x1, y1 = item.bbox
         side = max(x1 - x0, y1 - y0) * float(rng.uniform(1.1, 2.6))
-        side = min(max(side, _LEAST_SIDE_PX), 0.95 * min(height, width))
+        side = min(max(side, _MIN_SIDE_PX), 0.95 * min(height, width))
         middle = np.array([x0 + x1, y0 + y1]) / 2 + rng.uniform(-0.15, 0.15, 2) * side
         x, y = (middle - side / 2).clip(0, (width - side, height - side)).tolist()
         area = np.s_[int(y) : int(y + side), int(x) : int(x + side)]
-        if (sample.ids[area] > 0).mean() >= _LEAST_CONTAINER:
+        if (sample.ids[area] > 0).mean() >= _MIN_CONTAINER_SHARE:
             yield (x, y, side), item.class_name
 
 
@@ -101,9 +103,10 @@ def _cut(sample: Sample, square: tuple[float, float, float]) -> Pixels:
 
 
 def change_of(damaged: Pixels, undamaged: Pixels) -> float:
-    """Return the mean change of the twentieth of a panel that a damage changes most, in levels.
+    """Return how much a damage changes a panel.
 
-    Both are blurred by about a pixel, which removes most noise.
+    This is the mean change of the 5 % of pixels that change most, in 8-bit levels. Both panels are
+    blurred with a sigma of 1.2 pixels, which removes most of the noise.
     """
     blurred = (
         cv2.GaussianBlur(panel.astype(np.float32), (0, 0), _BLUR_PX)

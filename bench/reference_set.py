@@ -65,7 +65,7 @@ class Case:
 
     @property
     def texel_mm(self) -> float:
-        """Size of the texels that Cycles sees, a quarter of a pixel of the closest camera."""
+        """Size in mm of the texels that Cycles sees; a quarter of a pixel of the closest camera."""
         return 3.0
 
     def drawn(self) -> Scene:

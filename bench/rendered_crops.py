@@ -1,8 +1,8 @@
 """Labelled crops from fresh renders: markers, identifiers, panels and backgrounds.
 
 A gate camera stands a few metres from the container. Cameras here are therefore aimed at single
-markers, identifiers and damages from there, in small images. One scene gives many crops, because
-its second and further views cost a fifth of the first.
+markers and identifiers from there, in small images. panel_crops.py does so for damages. The second
+view of a scene costs a fifth of the first, so each scene gives many crops.
 """
 
 import os
@@ -101,7 +101,8 @@ class Crops:
         markers: Crops [MARKER_PX, MARKER_PX, 3] and their classes.
         backgrounds: Crops of the same size without a marker.
         texts: Identifiers.
-        panels: Crops [PANEL_PX, PANEL_PX, 3], and the damage class or ''.
+        panels: Crops [PANEL_PX, PANEL_PX, 3] and their damage class. Each damaged crop is followed
+            by the same crop without damage, whose class is ''.
     """
 
     markers: list[tuple[Pixels, str]] = field(default_factory=list)

@@ -19,10 +19,12 @@ import argparse
 import json
 import os
 import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from reference_set import FOLDER, SAMPLES, SCALE, SEED, SIZE, Case, cases, load
 from surrounded_cases import every_case, surrounded_cases

@@ -14,10 +14,11 @@ from crop_statistics import (
     wilson,
 )
 from marker_search import Found, overlap, true_scores
-from panel_crops import square_crop
+from panel_crops import DAMAGED, change_of, panels_of, square_crop
 from real_crops import load_real
 from text_peer import contains_code, joined
 
+from fastgen import Generator
 from fastgen.errors import ConfigError
 
 CODE = "CSQU3054383"
@@ -163,3 +164,25 @@ def test_true_markers_take_the_score_of_a_find_of_their_class():
     assert overlap(boxes, boxes).tolist() == [[1, 0], [0, 1]]
     found = Found(boxes + 1, np.array([3, 5]), np.array([0.9, 0.8]))
     assert true_scores(found, boxes, np.array([3, 4])).tolist() == [0.9, 0.0]
+
+
+def test_change_of_a_panel_is_that_of_its_most_changed_part():
+    panel = np.full((80, 80, 3), 100, np.uint8)
+    assert change_of(panel, panel) == 0
+    assert change_of(panel + 7, panel) == pytest.approx(7, abs=1e-3)
+    spot = panel.copy()
+    spot[20:60, 20:60, 1] += 30
+    assert change_of(spot, panel) == pytest.approx(30, abs=0.5)
+
+
+def test_pairs_of_panels_show_the_same_place_with_and_without_damage():
+    with Generator(DAMAGED, seed=3, size=(160, 160), quality="draft") as generator:
+        panels = panels_of(generator, generator.scene(0), np.random.default_rng(1))
+    damaged, undamaged = panels[::2], panels[1::2]
+    assert len(damaged) == len(undamaged) > 2
+    assert {kind for _, kind in damaged} <= set(DAMAGED.damage.kinds)
+    assert {kind for _, kind in undamaged} == {""}
+    changes = [change_of(a, b) for (a, _), (b, _) in zip(damaged, undamaged, strict=True)]
+    others = [change_of(a, b) for (a, _), (b, _) in zip(damaged, undamaged[1:], strict=False)]
+    assert min(changes) > 0
+    assert np.median(changes) < 0.5 * np.median(others)

@@ -71,7 +71,7 @@ _OUTDOORS: dict[str, Any] = {
     },
     "surface": {
         "color_weights": _FLEET_PAINT,
-        # most containers at gates have deep colors, and little rust beside their edges
+        # as in photographs: paint is hardly bleached, and most rust is along edges
         "bleach": [0.0, 0.35],
         "rust_coverage": [0.0, 0.04],
     },
@@ -94,8 +94,8 @@ _OUTDOORS: dict[str, Any] = {
     "seals": {"probability": 0.7},
     "weather": {"fog_probability": 0.12, "rain_probability": 0.15, "wet_probability": 0.1},
 }
-"""Damage, fleets, labels, seals, weather and sensor effects, which the presets of real cameras
-share."""
+"""Damage, paint and rust of fleets, labels, seals, weather and sensor effects, which the presets of
+real cameras share."""
 
 _UNPAVED = ("dawn", "forest", "forest_2", "night", "night_2", "park", "sky", "sunrise")
 _HOURS = {

@@ -29,15 +29,18 @@ class MaterialTextures:
         bundled = art_layers()
         layers = {**bundled, **{name: len(bundled) + i for i, name in enumerate(own.art)}}
         self._prints = Prints(layers, all_glyphs(own.fonts))
-        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(2 + MAX_NEIGHBOURS)
+        most = 2 * (1 + MAX_NEIGHBOURS)  # see release_old
+        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(most)
         self.shared = material_tables(gl, self._prints.glyphs, list(own.art.values()))
 
-    def drop_old(self, containers: int) -> None:
-        """Drop all but the `containers` that were used last and one more, to save memory.
+    def release_old(self, containers: int) -> None:
+        """Release the tables of past scenes, about 3 MB per container.
 
-        The tables of one container take about 3 MB.
+        Args:
+            containers: Number of containers of the current scene. The tables of twice as many are
+                kept, those used last, because a scene and its variation may take turns.
         """
-        self._scenes.shrink(1 + containers)
+        self._scenes.shrink(2 * containers)
 
     def resources(self, prepared: PreparedScene) -> SceneResources:
         """Return what is kept for a scene."""

@@ -150,7 +150,7 @@ class Renderer:
         """
         scene = prepared.scene
         self._compile_for(prepared)
-        self._materials.drop_old(len(prepared.members))
+        self._materials.release_old(len(prepared.members))
         exposure = self._lights.exposure(scene, camera, view).factor
         several = bool(scene.neighbours or scene.ground)
         options = DrawOptions(layer, radiance, over=several)

@@ -305,10 +305,11 @@ class Scene:
         raise KeyError(f"no camera {name!r}; this scene has {[c.name for c in self.cameras]}")
 
     def undamaged(self) -> "Scene":
-        """Return the same scene with all its containers undamaged.
+        """Return the same scene with no damage on any container.
 
-        Rendered by the same camera, the two scenes differ in nothing but the damages, the rust and
-        scrapes that belong to them, and their light and shadows. A decal beside a damage stays.
+        Images of both scenes from the same camera differ only in the damages: their shape, bare or
+        rusty places, scratches, light and shadows. Decals and seals stay, including repairs and the
+        streaks of rust below damages.
         """
         whole = tuple(replace(each, damages=()) for each in self.neighbours)
         return replace(self, damages=(), neighbours=whole)
