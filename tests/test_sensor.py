@@ -178,7 +178,8 @@ def test_by_default_cameras_are_perfect_and_the_sky_is_clear():
 
 
 def test_the_preset_of_real_cameras_shares_all_other_draws_and_survives_json():
-    same = {"surface": {"color_weights": {}}, "markings": {"marked_containers": 1.0}}
+    same = {"markings": {"marked_containers": 1.0}}
+    same["surface"] = Config.preset().to_plain()["surface"]
     same["spreader"] = {"probability": Config.preset().spreader.probability}
     same["seals"] = {"probability": 0.0}
     same["environment"] = {"lamps": {"probability": 0.0}}
