@@ -143,6 +143,24 @@ def surrounded_cases() -> list[SurroundedCase]:
             _ground("asphalt", asphalt, 0.4, 0.5),
             Camera(_CAMERA, (4500.0, 4500.0, 8500.0), (200.0, 400.0, 1200.0), 26.0),
         ),
+        SurroundedCase(
+            37, _CAMERA, "sky", True, False, "folds close up", 230.0,
+            _ground("concrete", concrete, 0.3, 0.0),
+            Camera(_CAMERA, (200.0, -4300.0, 1900.0), (-1465.0, -1204.0, 960.0), 60.0),
+            damage={
+                "kinds": ["concave"], "count": 1, "faces": ["front"],
+                "concave": {"creased": 1, "outward": 0},
+            },
+        ),
+        SurroundedCase(
+            38, _CAMERA, "port_noon", True, False, "torn hole close up", 110.0,
+            _ground("asphalt", asphalt, 0.3, 0.0),
+            Camera(_CAMERA, (-900.0, -3400.0, 1500.0), (-2076.0, -1204.0, 789.0), 90.0),
+            damage={
+                "kinds": ["perforation"], "count": 1, "faces": ["front"],
+                "perforation": {"torn": 1, "split": 0, "tear_length_mm": [450, 700]},
+            },
+        ),
     ]  # fmt: skip
 
 

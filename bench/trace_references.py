@@ -1,7 +1,7 @@
 """Path-trace the references that `bench/accuracy.py` compares with.
 
     python bench/trace_references.py --blender-python PYTHON [--cases 8] [--twice 2] [--series 8]
-    python bench/trace_references.py --blender-python PYTHON --only 32,33,34,35,36
+    python bench/trace_references.py --blender-python PYTHON --only 32,33,34,35,36,37,38
 
 Run it once, in the background: a reference takes 150 to 1,500 CPU seconds. PYTHON is a Python 3.11
 with bpy==4.5.15. Existing files are not traced again, so an interrupted run can be continued. Cases

@@ -47,7 +47,7 @@ def test_the_scene_of_a_case_has_its_light_damage_and_rust():
 
 
 def test_surrounded_cases_can_be_drawn_and_are_numbered_on():
-    assert [case.number for case in surrounded_cases()] == [*range(32, 37)]
+    assert [case.number for case in surrounded_cases()] == [*range(32, 39)]
     for case in surrounded_cases():
         scene = check_scene(case.drawn())
         assert scene.ground is not None
@@ -120,7 +120,8 @@ def test_a_stored_reference_loads_and_matches_its_case(path):
     reference = reference_set.load(case.number)
     assert reference.scene.environment.name == case.light
     assert (reference.scene.ground is not None) == (case in surrounded_cases())
-    assert 0.02 < reference.inside.mean() < 0.98
+    close_up = bool(getattr(case, "damage", None))  # the container may fill the image
+    assert 0.02 < reference.inside.mean() < (1.01 if close_up else 0.98)
     for image in reference.radiance.values():
         assert np.isfinite(image).all()
         assert image.shape == (*reference.inside.shape, 3)
