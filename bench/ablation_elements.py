@@ -252,7 +252,7 @@ ELEMENTS = (
     Element("decals", "traces of removed markers", _without_art("overpaint", "placard_residue")),
     Element("decals", "wear of decals", _fresh_print),
     Element("decals", "repainted patches", _without_art("patch")),
-    Element("shape", "damage", lambda scene: replace(scene, damages=())),
+    Element("shape", "damage", Scene.undamaged),
     Element(
         "shape",
         "door gear: bars, cams, handles, hinges",

@@ -224,10 +224,13 @@ def by_surroundings(results: dict[str, list[Result]]) -> list[str]:
         case = same[0].case
         assert isinstance(case, SurroundedCase)
         rows.append([value for r in same for value in (r.measures[3], r.ground)])
-        cells = " | ".join(f"{value:.3f}" for value in rows[-1])
-        lines.append(f"| {case.number}: {case.name}, {case.light} | {cells} |")
-    means = " | ".join(f"{value:.3f}" for value in np.nanmean(rows, axis=0))
-    return [*lines, f"| mean | {means} |"]
+        lines.append(f"| {case.number}: {case.name}, {case.light} | {_cells(rows[-1])} |")
+    return [*lines, f"| mean | {_cells(np.nanmean(rows, axis=0))} |"]
+
+
+def _cells(values: Iterable[float]) -> str:
+    """Return cells of a table; an image without ground has no value there."""
+    return " | ".join("-" if np.isnan(value) else f"{value:.3f}" for value in values)
 
 
 def as_samples(results: dict[str, list[Result]], figures: Figures) -> list[str]:

@@ -26,7 +26,7 @@ from gap_renders import Effort, Renders
 from marker_search import overlap, search, true_scores
 from numpy.typing import NDArray
 from panel_crops import PANEL_PX, Pixels, change_of, square_crop
-from real_crops import DAMAGE_KINDS, LAYOUTS, RealCrops
+from real_crops import DAMAGE_KINDS, LAYOUTS, PanelPair, RealCrops
 from rendered_crops import MARKER_PX, Crops
 from text import edit_distance
 
@@ -181,23 +181,14 @@ def false_markers(trial: Trial) -> Measures:
 
 def damage(trial: Trial) -> Measures:
     """Return AUCs of damaged against undamaged panels, on ours and theirs."""
-    panels = trial.crops.panels
-    pixels = np.stack([crop for crop, _ in panels])
-    classes = np.array([int(kind != "") for _, kind in panels])
-    model = fit_classifier(pixels, classes, 2, trial.effort.damage_steps, trial.seed)
-    mine = trial.renders.held_out.panels
-    ours = model.shares(np.stack([crop for crop, _ in mine]))[:, 1]
-    found = _by_kind_and_change(ours.astype(float), mine)
-    theirs = trial.real.panels
-    damaged, undamaged = (
-        model.shares(
-            np.array(
-                [cv2.resize(p, (PANEL_PX, PANEL_PX), interpolation=cv2.INTER_AREA) for p in each],
-                np.uint8,
-            )
-        )[:, 1]
-        for each in ([p.damaged for p in theirs], [p.undamaged for p in theirs])
+    pairs = trial.crops.panels
+    classes = np.tile([1, 0], len(pairs))
+    model = fit_classifier(
+        np.stack(_both(pairs)), classes, 2, trial.effort.damage_steps, trial.seed
     )
+    mine, theirs = trial.renders.held_out.panels, trial.real.panels
+    found = _by_kind_and_change(*_scores(model, mine), mine)
+    damaged, undamaged = _scores(model, theirs)
     found["theirs, all"] = auc_interval(damaged, undamaged)
     for kind in sorted(DAMAGE_KINDS, reverse=True):
         chosen = np.array([p.kind == kind for p in theirs])
@@ -206,20 +197,31 @@ def damage(trial: Trial) -> Measures:
     return found
 
 
-def _by_kind_and_change(scores: Array, panels: Sequence[tuple[Pixels, str]]) -> Measures:
+def _both(pairs: Sequence[PanelPair]) -> list[Pixels]:
+    """Return the panels of all pairs, each damaged one before the undamaged one."""
+    return [panel for pair in pairs for panel in (pair.damaged, pair.undamaged)]
+
+
+def _scores(model: Classifier, pairs: Sequence[PanelPair]) -> tuple[Array, Array]:
+    """Return the probability [N] that a panel is damaged, for the damaged and the undamaged."""
+    size = (PANEL_PX, PANEL_PX)
+    panels = [cv2.resize(panel, size, interpolation=cv2.INTER_AREA) for panel in _both(pairs)]
+    shares: Array = model.shares(np.array(panels, np.uint8))[:, 1].astype(float)
+    return shares[::2], shares[1::2]
+
+
+def _by_kind_and_change(damaged: Array, undamaged: Array, pairs: Sequence[PanelPair]) -> Measures:
     """Return AUCs on our panels by kind of damage, and by how much the damage changes the panel.
 
     Each group is compared with all undamaged panels.
 
     Args:
-        scores: Score [N] of each panel.
-        panels: Damaged panels, each followed by the same panel without damage.
+        damaged: Scores [N] of the damaged panels.
+        undamaged: Scores [N] of the undamaged panels.
+        pairs: The panels.
     """
-    damaged, whole = scores[::2], scores[1::2]
-    kinds = np.array([kind for _, kind in panels[::2]])
-    change = np.array(
-        [change_of(a, b) for (a, _), (b, _) in zip(panels[::2], panels[1::2], strict=True)]
-    )
+    kinds = np.array([pair.kind for pair in pairs])
+    change = np.array([change_of(pair.damaged, pair.undamaged) for pair in pairs])
     groups = {
         "all": np.ones(len(kinds), bool),
         "dent": np.isin(kinds, _DENTS),
@@ -230,7 +232,7 @@ def _by_kind_and_change(scores: Array, panels: Sequence[tuple[Pixels, str]]) -> 
         },
     }
     return {
-        f"ours, held out, {name}": auc_interval(damaged[chosen], whole)
+        f"ours, held out, {name}": auc_interval(damaged[chosen], undamaged)
         for name, chosen in groups.items()
         if chosen.sum() >= _MIN_PANELS
     }
@@ -267,10 +269,10 @@ def _groups(trial: Trial) -> Iterator[tuple[str, list[Pixels], list[Pixels]]]:
         gate = trial.renders.views("gate")
         yield "photographs, preset gate", [view.image for view in gate], list(real.photos)
     if real.panels:
-        theirs = [p for pair in real.panels for p in (pair.damaged, pair.undamaged)]
-        # one panel of each pair, damaged and undamaged in turn
         pairs = trial.renders.held_out.panels
-        ours = [pairs[k + k // 2 % 2][0] for k in range(0, len(pairs), 2)]
+        # one panel of each pair, which differ too little to count as two
+        ours = [p.undamaged if k % 2 else p.damaged for k, p in enumerate(pairs)]
+        theirs = _both(real.panels)
         yield "panels", ours, theirs
     if real.identifiers:
         ours = [text.framed() for text in trial.renders.texts]

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from aimed_cameras import Views, aimed
 from numpy.typing import NDArray
+from real_crops import PanelPair
 
 from fastgen import Config, Generator
 from fastgen.sample import Sample
@@ -48,19 +49,16 @@ _MIN_CONTAINER_SHARE = 0.3
 _BLUR_PX = 1.2
 
 
-def panels_of(
-    generator: Generator, scene: Scene, rng: np.random.Generator
-) -> list[tuple[Pixels, str]]:
+def panels_of(generator: Generator, scene: Scene, rng: np.random.Generator) -> list[PanelPair]:
     """Render squares around the damages of a scene, each with and without the damages.
 
     Everything else is equal in both, so only the damage distinguishes them. One camera is aimed at
     each damage; other damages that it sees get a square too.
 
     Returns:
-        Crops [PANEL_PX, PANEL_PX, 3] and their damage class. Each damaged crop is followed by the
-        same crop without damage, whose class is ''.
+        Pairs of crops [PANEL_PX, PANEL_PX, 3] with the damage class.
     """
-    found: list[tuple[Pixels, str]] = []
+    found: list[PanelPair] = []
     whole = scene.undamaged()
     for damage in scene.damages:
         size = min(max(damage.size_mm), 1500.0) * float(rng.uniform(1.6, 3.5))
@@ -71,16 +69,15 @@ def panels_of(
         damaged = generator.render(scene=scene, camera=camera)
         squares = list(_squares(damaged, rng))
         if squares:
-            undamaged = generator.render(scene=whole, camera=camera)
-            for square, kind in squares:
-                found += [(_cut(damaged, square), kind), (_cut(undamaged, square), "")]
+            images = damaged.image, generator.render(scene=whole, camera=camera).image
+            for box, kind in squares:
+                one, other = (square_crop(image, box, PANEL_PX, margin=0.0) for image in images)
+                found.append(PanelPair(one, other, kind))
     return found
 
 
-def _squares(
-    sample: Sample, rng: np.random.Generator
-) -> Iterator[tuple[tuple[float, float, float], str]]:
-    """Yield left, top and side of a square around each visible damage, and its class."""
+def _squares(sample: Sample, rng: np.random.Generator) -> Iterator[tuple[list[float], str]]:
+    """Yield the box x0, y0, x1, y1 of a square around each visible damage, and its class."""
     height, width = sample.damage.shape
     for item in sample.objects:
         if item.class_name not in DAMAGED.damage.kinds or item.bbox is None:
@@ -94,12 +91,7 @@ def _squares(
         x, y = (middle - side / 2).clip(0, (width - side, height - side)).tolist()
         area = np.s_[int(y) : int(y + side), int(x) : int(x + side)]
         if (sample.ids[area] > 0).mean() >= _MIN_CONTAINER_SHARE:
-            yield (x, y, side), item.class_name
-
-
-def _cut(sample: Sample, square: tuple[float, float, float]) -> Pixels:
-    x, y, side = square
-    return square_crop(sample.image, (x, y, x + side, y + side), PANEL_PX, margin=0.0)
+            yield [x, y, x + side, y + side], item.class_name
 
 
 def change_of(damaged: Pixels, undamaged: Pixels) -> float:

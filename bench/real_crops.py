@@ -59,7 +59,10 @@ class RealIdentifier:
 
 @dataclass(frozen=True, eq=False)
 class PanelPair:
-    """A damaged and an undamaged panel of one photograph; `kind` is one of DAMAGE_KINDS."""
+    """A damaged and an undamaged panel of one photograph, or of one view of a rendered scene.
+
+    `kind` is one of DAMAGE_KINDS, or the damage class in a render.
+    """
 
     damaged: Pixels
     undamaged: Pixels

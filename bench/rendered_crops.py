@@ -17,6 +17,7 @@ import numpy as np
 from aimed_cameras import aimed, place_mm
 from numpy.typing import NDArray
 from panel_crops import DAMAGED, Pixels, panels_of, square_crop
+from real_crops import PanelPair
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
@@ -101,14 +102,13 @@ class Crops:
         markers: Crops [MARKER_PX, MARKER_PX, 3] and their classes.
         backgrounds: Crops of the same size without a marker.
         texts: Identifiers.
-        panels: Crops [PANEL_PX, PANEL_PX, 3] and their damage class. Each damaged crop is followed
-            by the same crop without damage, whose class is ''.
+        panels: Pairs of crops [PANEL_PX, PANEL_PX, 3] with the damage class.
     """
 
     markers: list[tuple[Pixels, str]] = field(default_factory=list)
     backgrounds: list[Pixels] = field(default_factory=list)
     texts: list[Text] = field(default_factory=list)
-    panels: list[tuple[Pixels, str]] = field(default_factory=list)
+    panels: list[PanelPair] = field(default_factory=list)
 
     def add(self, other: "Crops") -> None:
         """Append the crops of another set."""

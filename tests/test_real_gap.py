@@ -1,6 +1,7 @@
 """The comparison with real pictures: its folder, its measures and its reading order."""
 
 import math
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -178,11 +179,9 @@ def test_change_of_a_panel_is_that_of_its_most_changed_part():
 def test_pairs_of_panels_show_the_same_place_with_and_without_damage():
     with Generator(DAMAGED, seed=3, size=(160, 160), quality="draft") as generator:
         panels = panels_of(generator, generator.scene(0), np.random.default_rng(1))
-    damaged, undamaged = panels[::2], panels[1::2]
-    assert len(damaged) == len(undamaged) > 2
-    assert {kind for _, kind in damaged} <= set(DAMAGED.damage.kinds)
-    assert {kind for _, kind in undamaged} == {""}
-    changes = [change_of(a, b) for (a, _), (b, _) in zip(damaged, undamaged, strict=True)]
-    others = [change_of(a, b) for (a, _), (b, _) in zip(damaged, undamaged[1:], strict=False)]
+    assert len(panels) > 2
+    assert {pair.kind for pair in panels} <= set(DAMAGED.damage.kinds)
+    changes = [change_of(pair.damaged, pair.undamaged) for pair in panels]
+    others = [change_of(a.damaged, b.undamaged) for a, b in pairwise(panels)]
     assert min(changes) > 0
     assert np.median(changes) < 0.5 * np.median(others)

@@ -170,19 +170,15 @@ def _no_spreader(scene: Scene) -> Scene:
     return replace(scene, spreader=Spreader())
 
 
-def _undamaged(scene: Scene) -> Scene:
-    return replace(scene, damages=())
-
-
 def _one_paint(scene: Scene) -> Scene:
     paint = replace(scene.surface.paint, albedo=(0.2, 0.2, 0.2))
     return replace(scene, surface=replace(scene.surface, paint=paint))
 
 
 def _plain(scene: Scene) -> Scene:
-    for off in (_no_rust, _no_dirt, _unworn, _markers_only, _one_light, _no_spreader, _undamaged):
+    for off in (_no_rust, _no_dirt, _unworn, _markers_only, _one_light, _no_spreader):
         scene = off(scene)
-    return _one_paint(scene)
+    return _one_paint(scene.undamaged())
 
 
 SHADE, EVERYTHING = "shade of parts on each other", "all of these"
@@ -198,7 +194,7 @@ ELEMENTS: dict[str, Callable[[Scene], Scene]] = {
     "texts and stickers": _markers_only,
     "different lights": _one_light,
     "spreader": _no_spreader,
-    "damage": _undamaged,
+    "damage": Scene.undamaged,
     "different paints": _one_paint,
     SHADE: lambda scene: scene,
     EVERYTHING: _plain,
