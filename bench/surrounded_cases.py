@@ -149,7 +149,7 @@ def surrounded_cases() -> list[SurroundedCase]:
             Camera(_CAMERA, (200.0, -4300.0, 1900.0), (-1465.0, -1204.0, 960.0), 60.0),
             damage={
                 "kinds": ["concave"], "count": 1, "faces": ["front"],
-                "concave": {"creased": 1, "outward": 0},
+                "concave": {"buckled": 0, "creased": 1, "outward": 0},
             },
         ),
         SurroundedCase(

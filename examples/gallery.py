@@ -151,7 +151,8 @@ SECTIONS = {
     "damage": Section(
         (
             _damage("axis: a pushed-in edge", "axis", 9, kinked=0.0),
-            _damage("concave: a bowed wall", "concave", 1, outward=0.0, creased=1.0),
+            _damage("concave: a folded wall", "concave", 1, outward=0.0, buckled=0.0, creased=1.0),
+            _damage("concave: buckled ribs", "concave", 1, outward=0.0, buckled=1.0),
             _damage("dented: a fold", "dented", 2, marks={"probability": 0.0}),
             _damage("dented: crush marks", "dented", 11, marks={"probability": 1.0}),
             _damage("perforation: a torn hole", "perforation", 5),

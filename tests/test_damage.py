@@ -31,7 +31,7 @@ PAPER = Config.from_values(
         "damage": {
             "probability": 1.0,
             "axis": {"kinked": 0},
-            "concave": {"creased": 0},
+            "concave": {"buckled": 0, "creased": 0},
             "dented": {"marks": {"probability": 0}},
             "perforation": {"torn": 0},
         }

@@ -101,7 +101,7 @@ def test_severity_is_the_largest_displacement(kind, form):
             middle, most = np.array([u[i], v[j]]), max(most, float(np.abs(moved).max()))
         assert severity_mm(damage) == pytest.approx(most, rel=0.01, abs=0.02)
         differ += abs(most - abs(damage.depth_mm)) > 0.05 * most
-    assert differ > 10 if form in ("creased", "kinked", "ribs") else differ == 0
+    assert differ > 10 if form in ("buckled", "creased", "kinked", "ribs") else differ == 0
 
 
 @pytest.mark.parametrize(("kind", "form"), FORM_NAMES)
@@ -146,7 +146,7 @@ def test_the_shaders_change_nothing_outside_the_reach(gl):
     rng = np.random.default_rng(2)
     scene = Generator(Config(), seed=1).scene(0)
     inside = np.zeros(len(FORM_NAMES), int)
-    for _ in range(10):
+    for _ in range(13):
         damages = tuple(random_damage(rng, *name) for name in FORM_NAMES for _ in range(7))
         local, points = zip(*(points_around(rng, each, 100) for each in damages), strict=True)
         number = np.repeat(np.arange(len(damages)), 100)

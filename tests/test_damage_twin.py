@@ -162,7 +162,12 @@ def near_outline(damage, points):
 
 def test_opposite_displacements_leave_no_mask(gl):
     """A bulge on a dent of the same field puts the sheet back where it was."""
-    values = {"probability": 1.0, "count": [1, 1], "kinds": ["concave"], "concave": {"creased": 0}}
+    values = {
+        "probability": 1.0,
+        "count": [1, 1],
+        "kinds": ["concave"],
+        "concave": {"buckled": 0, "creased": 0},
+    }
     scene = Generator(Config.from_values({"damage": values}), seed=4).scene(0)
     (dent,) = scene.damages
     bulge = replace(dent, depth_mm=-dent.depth_mm, origin_mm=tuple(np.add(dent.origin_mm, 1e-3)))

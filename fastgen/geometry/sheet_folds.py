@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.scene.faces import FACE_AXES
+from fastgen.scene.faces import CORRUGATED_ALONG_Y, FACE_AXES
 
 if TYPE_CHECKING:
     from fastgen.geometry.mesh import Mesh
@@ -14,9 +14,6 @@ if TYPE_CHECKING:
 VERSION = 1  # raise when the stored arrays change
 
 _STEP_MM = 4.0
-
-CORRUGATED_ALONG_Y = "door"
-"""Face whose corrugation runs along sheet y; that of the others runs along sheet x."""
 
 
 def corrugated_axis(face: str) -> int:

@@ -16,7 +16,6 @@ from fastgen.damages import fields
 from fastgen.decals.artwork import ART_SIZE
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
-from fastgen.geometry.sheet_folds import CORRUGATED_ALONG_Y
 from fastgen.light import environment
 from fastgen.light.ground_light import LINE_MM
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX
@@ -44,6 +43,7 @@ from fastgen.render.zone_codes import (
     ZONE_TURN,
 )
 from fastgen.scene.damage_kinds import forms_of
+from fastgen.scene.faces import CORRUGATED_ALONG_Y
 from fastgen.scene.limits import DECAL_KINDS, GROUNDS, MIN_ROUGHNESS
 
 LIST_GROUP = 64

@@ -12,7 +12,6 @@ from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import corners_mm
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.geometry.sheet_folds import CORRUGATED_ALONG_Y
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
 from fastgen.render.regions import (
@@ -29,7 +28,7 @@ from fastgen.render.variant import ShaderVariant
 from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Damage
 from fastgen.scene.damage_kinds import form_of
-from fastgen.scene.faces import FACE_AXES
+from fastgen.scene.faces import CORRUGATED_ALONG_Y, FACE_AXES
 from fastgen.scene.limits import MM
 
 _LEAST_FACING = 0.02

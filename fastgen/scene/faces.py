@@ -10,6 +10,9 @@ FACES = ("front", "back", "door", "no_door", "roof", "underside")
 SHEET_FACES = ("front", "back", "door", "no_door", "roof")
 """Faces that can carry decals and damage."""
 
+CORRUGATED_ALONG_Y = "door"
+"""Face whose corrugation runs along sheet y; that of the others runs along sheet x."""
+
 
 @dataclass(frozen=True)
 class Axes:

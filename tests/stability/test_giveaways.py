@@ -20,6 +20,7 @@ from fastgen.classes import (
     MARKER_CLASSES,
     UNDAMAGED_CONTAINER,
 )
+from fastgen.damages.buckled import BUCKLED
 from fastgen.damages.creased import CREASED
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render import draw_blocks as rendering
@@ -38,9 +39,10 @@ def without_effect(damage_values):
         values["damage_inward"] = [(*row[:3], 0.0) for row in values["damage_inward"]]
         values["damage_bare"] = [(*row[:3], 0.0) for row in values["damage_bare"]]
         shape = np.array(values["damage_shape"]).reshape(-1, 12)
-        number = forms_of(args[2]).index(CREASED)
-        creased = slice(values[f"form_{number - 1}_end"], values[f"form_{number}_end"])
-        shape[creased, 7] = 0.0  # share by which the corrugation is flattened
+        for form, flattens in ((CREASED, 7), (BUCKLED, 6)):  # share of the corrugation
+            number = forms_of(args[2]).index(form)
+            drawn = slice(values[f"form_{number - 1}_end"], values[f"form_{number}_end"])
+            shape[drawn, flattens] = 0.0
         values["damage_shape"] = shape.reshape(-1, 4)
         holes = values["hole_count"]
         for name in ("damage_along", "damage_across"):

@@ -1,0 +1,83 @@
+"""Corrugated sheet whose ribs buckle along one line.
+
+A rib is stiff along its length and soft across it. Pushed in, it bends at one place, where its
+crest is crushed, and stays nearly straight on both sides; its neighbours bend beside it. The bend
+passes smoothly into the flat sheet. shaders/damage_buckled.glsl is the GLSL twin.
+"""
+
+import numpy as np
+
+from fastgen.damages.creased import DEEPEST_MM, LEVEL_MM
+from fastgen.damages.fields import above_zero, bump, lesser
+from fastgen.scene import Damage
+from fastgen.scene.damage_kinds import LEAST, PHASE, Array, Form, Parameter, depth_span, half_size
+
+_PLACES = 1025
+"""Distances from the line, up to the length of the crushed part, at which `largest` looks."""
+
+
+def _height(damage: Damage, u: Array, off: Array) -> Array:
+    """Return the displacement as a share of the depth, before rounding; below 0 outside.
+
+    Args:
+        damage: The damage.
+        u: Distance along the damage, across the ribs, [...] in mm.
+        off: Distance from the line along the ribs, [...] in half widths.
+    """
+    sharpness, _, tilt, wobble, *_ = damage.shape
+    reach = 1 - abs(tilt) - wobble  # so that the farthest bend ends at the damage's width
+    sides = lesser(-off, off, 2 * sharpness * reach)
+    return np.asarray(bump(u / half_size(damage)[0]) + sides / reach)
+
+
+def _off(damage: Damage, u: Array, v: Array) -> Array:
+    """Return the distance [...] from the line along the ribs, in half widths."""
+    _, _, tilt, wobble, wavelength_mm, phase, *_ = damage.shape
+    half_length, half_width = half_size(damage)
+    line = tilt * u / half_length + wobble * np.sin(2 * np.pi * u / wavelength_mm + phase)
+    return np.asarray(v / half_width - line)
+
+
+def _moved(damage: Damage, u: Array, off: Array, w: Array) -> Array:
+    _, softness, *_, crushed, crushed_mm = damage.shape
+    height = above_zero(_height(damage, u, off), softness)
+    here = crushed * bump(off * half_size(damage)[1] / crushed_mm) * np.minimum(height, 1.0)
+    level = LEVEL_MM - np.clip(w, 0.0, DEEPEST_MM)
+    return np.asarray(damage.depth_mm * height + here * level)
+
+
+def _buckled(damage: Damage, u: Array, v: Array, w: Array) -> Array:
+    return _moved(damage, u, _off(damage, u, v), w)
+
+
+def _span(damage: Damage) -> tuple[float, float]:
+    low, high = depth_span(damage)
+    return low, high + damage.shape[6] * LEVEL_MM
+
+
+def _largest(damage: Damage) -> float:
+    """Return the displacement of the middle rib where it is largest, which is near the line."""
+    _, half_width = half_size(damage)
+    off = np.linspace(0, min(damage.shape[7] / half_width, 1.0), _PLACES)[:, None]
+    moved = _moved(damage, np.zeros(1), off, np.array([0.0, DEEPEST_MM]))
+    return float(np.abs(moved).max())
+
+
+BUCKLED = Form(
+    name="buckled",
+    glsl="buckled",
+    shader="damage_buckled.glsl",
+    amount=_buckled,
+    span=_span,
+    largest=_largest,
+    parameters=(
+        Parameter("radius of the bend at the line, as a share of the reach", LEAST, 0.5),
+        Parameter("length over which the bend runs out, as a share of the reach", LEAST, 1.0),
+        Parameter("distance of the line's ends from its middle, in half widths", -0.5, 0.5),
+        Parameter("swings of the line, in half widths", 0.0, 0.4),
+        Parameter("wavelength of the swings in mm", 20.0, 1e5),
+        PHASE,
+        Parameter("share by which the corrugation is crushed at the line", 0.0, 1.0),
+        Parameter("length of the crushed part to each side of the line in mm", 5.0, 1e4),
+    ),
+)
