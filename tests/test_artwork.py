@@ -3,6 +3,7 @@
 import colorsys
 import json
 from collections import defaultdict
+from ctypes import POINTER, c_int, c_uint, c_void_p
 
 import cv2
 import numpy as np
@@ -14,6 +15,7 @@ from fastgen.decals.artwork import (
     ART_SIZE,
     art_images,
     art_layers,
+    art_levels,
     brands,
     marker_prints,
     mip_levels,
@@ -21,10 +23,14 @@ from fastgen.decals.artwork import (
     stickers,
 )
 from fastgen.decals.glyphs import GLYPH_MOST_INK, glyph_coverage, glyph_sums, glyph_tiles
+from fastgen.render.art_textures import ArtTextures
 from fastgen.render.gl import open_context
+from fastgen.render.gl_enums import GL_RGBA, GL_TEXTURE_2D_ARRAY, GL_UNSIGNED_BYTE
 from fastgen.render.textures import levelled_texture
 from fastgen.resources import asset_path
 from fastgen.srgb import encoded, linear
+
+GL_TEXTURE_DEPTH = 0x8071
 
 HUES = {"red": 357, "orange": 25, "yellow": 48, "green": 156, "blue": 221}
 """Mean hue of each field colour in degrees; all its inks lie within HUE_RANGE."""
@@ -294,3 +300,41 @@ def test_glyph_sums_give_the_ink_of_any_rectangle_of_a_tile():
         found += sums[:, top, left]
         wanted = ink[:, top + 1 : bottom + 1, left + 1 : right + 1].sum(axis=(1, 2))
         np.testing.assert_allclose(found, wanted, atol=2 * GLYPH_MOST_INK / 65535)
+
+
+def stored_layers(gl, texture):
+    """Read back the largest mip level of the artwork, uint8 [K, ART_SIZE, ART_SIZE, 4]."""
+    size = gl.function("glGetTexLevelParameteriv", None, *(c_uint, c_int, c_uint), POINTER(c_int))
+    read = gl.function("glGetTexImage", None, c_uint, c_int, c_uint, c_uint, c_void_p)
+    texture.use()
+    count = c_int()
+    size(GL_TEXTURE_2D_ARRAY, 0, GL_TEXTURE_DEPTH, count)
+    texels = np.empty((count.value, ART_SIZE, ART_SIZE, 4), np.uint8)
+    read(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_UNSIGNED_BYTE, texels.ctypes.data)
+    return texels
+
+
+def test_art_textures_hold_the_artwork_of_the_scenes_that_use_it():
+    """Each layer is read back. Room for four grows when scenes use more at once."""
+    bundled, rng = art_layers(), np.random.default_rng(6)
+    own = rng.integers(0, 256, (ART_SIZE, ART_SIZE, 4), np.uint8)
+    wanted = {name: art_levels()[0][layer] for name, layer in bundled.items()}
+    wanted["own"] = premultiplied(own)
+    with open_context() as gl:
+        textures = ArtTextures(gl, {"own": own}, room=4)
+        sizes, held = set(), []
+        for count in (3, 2, 4, 1, 4, 9, 2, 3):
+            names = {*rng.choice(list(bundled), count, replace=False).tolist(), "own", "", "none"}
+            held.append(textures.take(names))
+            assert held[-1].keys() == names - {"", "none"}
+            if len(held) > 2:  # like the scenes that the renderer keeps
+                textures.give_back(held.pop(0))
+            texels = stored_layers(gl, textures.texture)
+            sizes.add(len(texels))
+            layers = {}
+            for each in held:
+                for name, layer in each.items():
+                    np.testing.assert_array_equal(texels[layer], wanted[name])
+                    assert layers.setdefault(layer, name) == name
+        assert len(sizes) > 1
+        textures.release()

@@ -2,9 +2,9 @@
 
 import moderngl
 
-from fastgen.decals.artwork import art_layers
 from fastgen.decals.own_fonts import OwnPrints
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.render.art_textures import ArtTextures
 from fastgen.render.gl import GLContext
 from fastgen.render.glyph_runs import all_glyphs
 from fastgen.render.material_tables import Textures, material_tables
@@ -26,12 +26,10 @@ class MaterialTextures:
 
     def __init__(self, gl: GLContext, own: OwnPrints) -> None:
         self._ctx = gl.ctx
-        bundled = art_layers()
-        layers = {**bundled, **{name: len(bundled) + i for i, name in enumerate(own.art)}}
-        self._prints = Prints(layers, all_glyphs(own.fonts))
+        self._prints = Prints(ArtTextures(gl, own.art), all_glyphs(own.fonts))
         most = 2 * (1 + MAX_NEIGHBOURS)  # see release_old
         self._scenes: ReleasingCache[SceneResources] = ReleasingCache(most)
-        self.shared = material_tables(gl, self._prints.glyphs, list(own.art.values()))
+        self.shared = material_tables(gl, self._prints.glyphs)
 
     def release_old(self, containers: int) -> None:
         """Release the tables of past scenes, about 3 MB per container.
@@ -48,9 +46,10 @@ class MaterialTextures:
 
     def of(self, decals: DecalTextures, zones: moderngl.Texture) -> Textures:
         """Return the textures of a draw with these decals and this table of zones."""
-        return {**self.shared, "zone_table": zones, **decals.textures}
+        art = self._prints.art.texture
+        return {**self.shared, "art": art, "zone_table": zones, **decals.textures}
 
     def release(self) -> None:
         """Free all GL objects."""
-        for item in (self._scenes, *self.shared.values()):
+        for item in (self._scenes, self._prints.art, *self.shared.values()):
             item.release()

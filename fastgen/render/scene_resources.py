@@ -7,8 +7,9 @@ import moderngl
 from numpy.typing import ArrayLike
 
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.render.art_textures import ArtTextures
 from fastgen.render.constants import DECAL_CELL_MM
-from fastgen.render.decal_tables import MARGIN_MM, pack_decals
+from fastgen.render.decal_tables import MARGIN_MM, SceneError, pack_decals
 from fastgen.render.decals_near import decals_near
 from fastgen.render.glyph_runs import GlyphTable
 from fastgen.render.surface_values import SceneMaterials
@@ -19,11 +20,11 @@ class Prints(NamedTuple):
     """Artwork and glyphs that decals can use.
 
     Attributes:
-        art_layers: Texture layer of each artwork by name.
+        art: Layers of artwork.
         glyphs: Glyphs of all fonts.
     """
 
-    art_layers: Mapping[str, int]
+    art: ArtTextures
     glyphs: GlyphTable
 
 
@@ -37,7 +38,8 @@ class DecalTextures:
     Args:
         ctx: The context that draws.
         prepared: The scene.
-        prints: Artwork and glyphs that decals can use.
+        layers: Texture layer of each artwork by name.
+        glyphs: Glyphs of all fonts.
         scale: See decal_tables.scale_for.
     """
 
@@ -45,12 +47,12 @@ class DecalTextures:
         self,
         ctx: moderngl.Context,
         prepared: PreparedScene,
-        prints: Prints,
+        layers: Mapping[str, int],
+        glyphs: GlyphTable,
         scale: float,
     ) -> None:
         scene, mesh = prepared.scene, prepared.container
         ids = prepared.numbers.decals
-        layers, glyphs = prints
         tables = pack_decals(scene.decals, ids, mesh, layers, scale, glyphs)
         margin_mm = scale * MARGIN_MM
         near = decals_near(tables.table[: len(scene.decals)], mesh.atlas_size_mm, margin_mm)
@@ -92,16 +94,24 @@ class SceneResources:
     ) -> None:
         self._ctx, self._prepared, self._prints = ctx, prepared, prints
         self.materials = SceneMaterials(prepared)
-        self._decals = {1.0: DecalTextures(ctx, prepared, prints, 1.0)}
+        self._layers = prints.art.take({decal.art for decal in prepared.scene.decals})
+        self._decals: dict[float, DecalTextures] = {}
+        try:
+            self.decals()
+        except SceneError:
+            self.release()
+            raise
 
     def decals(self, scale: float = 1.0) -> DecalTextures:
         """Return the decals for views of one scale, see decal_tables.scale_for."""
         if scale not in self._decals:
-            made = DecalTextures(self._ctx, self._prepared, self._prints, scale)
-            self._decals[scale] = made
+            self._decals[scale] = DecalTextures(
+                self._ctx, self._prepared, self._layers, self._prints.glyphs, scale
+            )
         return self._decals[scale]
 
     def release(self) -> None:
         """Free all GL objects."""
         for decals in self._decals.values():
             decals.release()
+        self._prints.art.give_back(self._layers)

@@ -35,18 +35,50 @@ def levelled_texture(
         srgb: Colours are sRGB. Shaders then read linear light, filtered as such.
     """
     count, side = levels[0].shape[:2]
+    texture = levelled_storage(gl, (side, count), len(levels), srgb)
+    fill_layers(gl, texture, 0, levels)
+    return texture
+
+
+def levelled_storage(
+    gl: GLContext, size: tuple[int, int], levels: int, srgb: bool
+) -> moderngl.TextureArray:
+    """Return an unfilled texture array, clamped at the borders.
+
+    Args:
+        gl: Current context.
+        size: Side in texels, and number of layers.
+        levels: Number of mip levels.
+        srgb: Colours are sRGB. Shaders then read linear light, filtered as such.
+    """
+    side, count = size
     stored = GL_SRGB8_ALPHA8 if srgb else GL_RGBA8
     texture = gl.ctx.texture_array((1, 1, 1), 4)
     texture.use()
     # allocates all levels once; drivers copy a texture that grows level by level
     allocate = gl.function("glTexStorage3D", None, _ENUM, _INT, _ENUM, *(_INT,) * 3)
-    allocate(GL_TEXTURE_2D_ARRAY, len(levels), stored, side, side, count)
+    allocate(GL_TEXTURE_2D_ARRAY, levels, stored, side, side, count)
+    return _clamped(texture)
+
+
+def fill_layers(
+    gl: GLContext, texture: moderngl.TextureArray, first: int, levels: Sequence[np.ndarray]
+) -> None:
+    """Fill layers of a texture array.
+
+    Args:
+        gl: Current context.
+        texture: The texture.
+        first: Its first layer to fill.
+        levels: All mip levels of the layers, uint8 [K, N, N, 4], each half as wide as the one
+            before.
+    """
+    texture.use()
     fill = gl.function("glTexSubImage3D", None, _ENUM, *(_INT,) * 7, _ENUM, _ENUM, ctypes.c_void_p)
     for level, texels in enumerate(map(np.ascontiguousarray, levels)):
-        size = (texels.shape[2], texels.shape[1], count)
+        size = (texels.shape[2], texels.shape[1], len(texels))
         address = texels.ctypes.data
-        fill(GL_TEXTURE_2D_ARRAY, level, 0, 0, 0, *size, GL_RGBA, GL_UNSIGNED_BYTE, address)
-    return _clamped(texture)
+        fill(GL_TEXTURE_2D_ARRAY, level, 0, 0, first, *size, GL_RGBA, GL_UNSIGNED_BYTE, address)
 
 
 def clamped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
