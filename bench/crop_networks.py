@@ -103,6 +103,37 @@ def fit_classifier(
     return model
 
 
+def fit_pairs(
+    positive: NDArray[np.uint8], negative: NDArray[np.uint8], steps: int, seed: int
+) -> Classifier:
+    """Train a classifier of two classes on pairs that differ only in what distinguishes them.
+
+    A batch has both crops of each pair with the same variation, so everything else cancels out.
+
+    Args:
+        positive: RGB crops [N, S, S, 3] of class 1.
+        negative: Their counterparts [N, S, S, 3] of class 0.
+        steps: Training steps.
+        seed: Seed of weights and order.
+    """
+    torch.manual_seed(seed)
+    model = Classifier(2)
+    count = 32
+    targets = torch.arange(2 * count) < count
+    sides = torch.from_numpy(positive), torch.from_numpy(negative)
+
+    def loss() -> torch.Tensor:
+        chosen = torch.randint(len(positive), (count,))
+        ones, others = (_input(side[chosen]) for side in sides)
+        with torch.random.fork_rng(devices=[]):
+            ones = _varied(ones)
+        crops = torch.cat([ones, _varied(others)])
+        return functional.cross_entropy(model(crops), targets.long(), label_smoothing=0.05)
+
+    _optimize(model, loss, steps)
+    return model
+
+
 def fit_reader(texts: Sequence[Text], steps: int, seed: int) -> Reader:
     """Train a reader on identifiers with known letter places.
 

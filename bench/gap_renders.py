@@ -39,7 +39,7 @@ class Effort:
     mined: int = 40
     marker_steps: int = 700
     reader_steps: int = 900
-    damage_steps: int = 1000
+    damage_steps: int = 1500
 
 
 class Renders:

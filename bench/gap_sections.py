@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from crop_networks import Classifier, fit_classifier, fit_reader
+from crop_networks import Classifier, fit_classifier, fit_pairs, fit_reader
 from crop_statistics import (
     Array,
     Interval,
@@ -182,9 +182,11 @@ def false_markers(trial: Trial) -> Measures:
 def damage(trial: Trial) -> Measures:
     """Return AUCs of damaged against undamaged panels, on ours and theirs."""
     pairs = trial.crops.panels
-    classes = np.tile([1, 0], len(pairs))
-    model = fit_classifier(
-        np.stack(_both(pairs)), classes, 2, trial.effort.damage_steps, trial.seed
+    model = fit_pairs(
+        np.stack([pair.damaged for pair in pairs]),
+        np.stack([pair.undamaged for pair in pairs]),
+        trial.effort.damage_steps,
+        trial.seed,
     )
     mine, theirs = trial.renders.held_out.panels, trial.real.panels
     found = _by_kind_and_change(*_scores(model, mine), mine)
