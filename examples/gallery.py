@@ -161,7 +161,6 @@ SECTIONS = {
             _damage("missing_paint: flaked off", "missing_paint", 9),
             _damage("graffiti: a sprayed tag", "graffiti", 11),
             _damage("door_gear: a bent bar", "door_gear", 13, missing=0.0, open=0.0),
-            _damage("door_gear: a missing bar", "door_gear", 1, missing=1.0),
             _damage("door_gear: an open handle", "door_gear", 11, missing=0.0, open=1.0),
         )
     ),
