@@ -16,6 +16,9 @@ _CHROMA_TO_RGB = np.array([[0, 1.402], [-0.344136, -0.714136], [1.772, 0]])
 
 _QUANTILES = 1 << 16
 
+_BAND_ROWS = 32
+"""Rows whose noise is computed at once, so that they stay in the processor's cache."""
+
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 _CAP_PX = 21.0
 """Height of the font's capitals at scale 1."""
@@ -55,12 +58,17 @@ def noisy(light: Light, noise: Noise, gain: float = 1.0) -> Light:
     """
     rng = np.random.Generator(np.random.SFC64(noise.seed))
     well = np.float32(noise.full_well_e / gain)
-    variance = np.maximum(light, 0) * well + np.float32(noise.read_noise_e**2)
-    spread = np.sqrt(variance, out=variance)
-    spread *= _standard_normal(rng, light.shape)
-    spread /= well
-    spread += light
-    return np.asarray(spread, np.float32)
+    result = np.empty_like(light)
+    for top in range(0, len(light), _BAND_ROWS):
+        part, spread = light[top : top + _BAND_ROWS], result[top : top + _BAND_ROWS]
+        np.maximum(part, 0, out=spread)
+        spread *= well
+        spread += np.float32(noise.read_noise_e**2)
+        np.sqrt(spread, out=spread)
+        spread *= _standard_normal(rng, part.shape)
+        spread *= 1 / well
+        spread += part
+    return result
 
 
 def _standard_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Light:

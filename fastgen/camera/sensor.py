@@ -36,8 +36,9 @@ _UNMETERED = Exposure(1.0)
 _METER_STEP = 8
 """Distance in pixels between the pixels in which a meter looks for highlights."""
 
-_NODE_PX = 4
-"""Distance in pixels between the pixels whose rays are computed."""
+_NODE_PX = 8
+"""Distance in pixels between the pixels whose rays are computed. Distances along other rays are
+interpolated; they are wrong by less than 1e-4 of their value."""
 
 
 def is_needed(camera: Camera, weather: Weather) -> bool:
@@ -153,7 +154,7 @@ def _along_rays(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the ray length per unit of depth and the distance of the background, by pixel.
 
-    Both are interpolated between every fourth pixel.
+    Both are interpolated between pixels _NODE_PX apart.
 
     Args:
         view: Projection of the camera.

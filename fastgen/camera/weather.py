@@ -83,19 +83,20 @@ def _behind(
         mixed: Rows and columns [N] of the partly covered pixels.
         share: float32 [N, 1], coverage of these pixels, 0..1.
     """
-    step = np.arange(-_BESIDE, _BESIDE + 1)
-    down, right = (offset.ravel() for offset in np.meshgrid(step, step, indexing="ij"))
-    height, width = cover.shape
-    rows = np.clip(mixed[0][:, None] + down, 0, height - 1)
-    columns = np.clip(mixed[1][:, None] + right, 0, width - 1)
-    beside, covered = light[rows, columns], cover[rows, columns][..., None]
-    own, bare, whole = light[mixed], covered == 0, covered == 255
-    count = bare.sum(axis=1)
-    beyond = np.where(count > 0, (beside * bare).sum(axis=1) / np.maximum(count, 1), own)
-    everywhere = cover == 255
-    usual = light[everywhere].mean(axis=0) if everywhere.any() else beyond
-    most = np.where(whole.any(axis=1), np.where(whole, beside, 0).max(axis=1), usual)
-    return np.clip((1 - share) * beyond, own - share * most, own)
+    own, sides = light[mixed], (2 * _BESIDE + 1,) * 2
+    bare, whole = (cover == value for value in (0, 255))
+    edge = cv2.BORDER_REPLICATE
+    count, total = (
+        cv2.boxFilter(part, -1, sides, normalize=False, borderType=edge)[mixed]
+        for part in (bare.astype(np.float32), light * bare[..., None])
+    )
+    beyond = np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], own)
+    usual = light[whole].mean(axis=0) if whole.any() else beyond
+    square = np.ones(sides, np.uint8)
+    near = cv2.dilate(whole.astype(np.uint8), square, borderType=edge)[mixed] > 0
+    brightest = cv2.dilate(light * whole[..., None], square, borderType=edge)[mixed]
+    most = np.where(near[:, None], brightest, usual)
+    return np.asarray(np.clip((1 - share) * beyond, own - share * most, own), np.float32)
 
 
 def _objects_m(ray_m: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -154,8 +155,13 @@ def add_rain(
 
 def _mixed(light: Light, other: Light, share: NDArray[np.float32]) -> Light:
     """Return light [H, W, 3] mixed with `other` [3] by the `share` [H, W] of each pixel."""
-    planes = zip(cv2.split(light), other, strict=True)
-    return np.asarray(cv2.merge([plane + share * (one - plane) for plane, one in planes]))
+    planes = cv2.split(light)
+    change = np.empty(light.shape[:2], np.float32)
+    for plane, one in zip(planes, other, strict=True):
+        np.subtract(one, plane, out=change)
+        change *= share
+        np.add(plane, change, out=plane)
+    return np.asarray(cv2.merge(planes))
 
 
 def _streaks(
