@@ -106,9 +106,10 @@ def fit_classifier(
 def fit_pairs(
     positive: NDArray[np.uint8], negative: NDArray[np.uint8], steps: int, seed: int
 ) -> Classifier:
-    """Train a classifier of two classes on pairs that differ only in what distinguishes them.
+    """Train a classifier of two classes on pairs of crops.
 
-    A batch has both crops of each pair with the same variation, so everything else cancels out.
+    A batch has both crops of each pair, varied in the same way, so the network sees no other
+    difference between the classes.
 
     Args:
         positive: RGB crops [N, S, S, 3] of class 1.

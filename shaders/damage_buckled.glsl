@@ -1,4 +1,4 @@
-// DamageField buckled_field(int i, vec3 q): ribs that buckle along one line, at local coordinates q.
+// DamageField buckled_ribs_field(int i, vec3 q): ribs that buckle along one line, at local coordinates q.
 // Twin of fastgen/damages/buckled.py.
 
 #include "units.constants"
@@ -6,8 +6,8 @@
 #include "damage.block"
 #include "damage_field.glsl"
 
-DamageField buckled_field(int i, vec3 q) {
-    vec4 a = damage_shape[3 * i];       // Sharpness, softness, tilt, wobble.
+DamageField buckled_ribs_field(int i, vec3 q) {
+    vec4 a = damage_shape[3 * i];       // Rounding, softness, tilt, wobble.
     vec4 b = damage_shape[3 * i + 1];   // Wavelength, phase, crushed share, crushed length.
     float half_length = damage_along[i].w, half_width = damage_across[i].w;
     float depth = damage_inward[i].w;
@@ -25,12 +25,12 @@ DamageField buckled_field(int i, vec3 q) {
     float crushed = b.z * bump(s);
     vec2 crushed_slope = b.z * bump_slope(s) * half_width / b.w * off_slope;
     float level = CREASED_LEVEL_MM - clamp(q.z, 0.0, CREASED_DEEPEST_MM);
-    vec2 more = level * (crushed_slope * min(up, 1.0) + (up < 1.0 ? crushed * tilt : vec2(0.0)));
-    float through = q.z > 0.0 && q.z < CREASED_DEEPEST_MM ? -crushed * min(up, 1.0) : 0.0;
+    vec2 more = level * (crushed_slope * up + crushed * tilt);
+    float through = q.z > 0.0 && q.z < CREASED_DEEPEST_MM ? -crushed * up : 0.0;
     float sheet = sheet_fade(q.z);
-    // Paint cracks where the crests are crushed.
+    // Paint cracks along the line, only on the crests.
     float rubbed = clamp(1.0 - q.z / CREASED_LEVEL_MM, 0.0, 1.0) * bump(s) * min(2.0 * up, 1.0);
-    return DamageField(sheet * (depth * up + crushed * min(up, 1.0) * level),
+    return DamageField(sheet * (depth * up + crushed * up * level),
                        sheet * vec3(depth * tilt + more, through),
                        0.5 * sheet * rubbed);
 }

@@ -315,13 +315,13 @@ def stored_layers(gl, texture):
 
 
 def test_art_textures_hold_the_artwork_of_the_scenes_that_use_it():
-    """Each layer is read back. Room for four grows when scenes use more at once."""
+    """Each layer is read back. A capacity of four grows when scenes use more at once."""
     bundled, rng = art_layers(), np.random.default_rng(6)
     own = rng.integers(0, 256, (ART_SIZE, ART_SIZE, 4), np.uint8)
     wanted = {name: art_levels()[0][layer] for name, layer in bundled.items()}
     wanted["own"] = premultiplied(own)
     with open_context() as gl:
-        textures = ArtTextures(gl, {"own": own}, room=4)
+        textures = ArtTextures(gl, {"own": own}, capacity=4)
         sizes, held = set(), []
         for count in (3, 2, 4, 1, 4, 9, 2, 3):
             names = {*rng.choice(list(bundled), count, replace=False).tolist(), "own", "", "none"}

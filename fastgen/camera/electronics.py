@@ -17,7 +17,7 @@ _CHROMA_TO_RGB = np.array([[0, 1.402], [-0.344136, -0.714136], [1.772, 0]])
 _QUANTILES = 1 << 16
 
 _BAND_ROWS = 32
-"""Rows whose noise is computed at once, so that they stay in the processor's cache."""
+"""Number of rows whose noise is computed at once, so that they stay in the processor's cache."""
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 _CAP_PX = 21.0

@@ -37,8 +37,9 @@ _METER_STEP = 8
 """Distance in pixels between the pixels in which a meter looks for highlights."""
 
 _NODE_PX = 8
-"""Distance in pixels between the pixels whose rays are computed. Distances along other rays are
-interpolated; they are wrong by less than 1e-4 of their value."""
+"""Distance in pixels between the pixels whose rays are computed; others are interpolated. Without
+lens distortion, with a focal length of f pixels, ray lengths are wrong by up to 16 / f^2 of their
+value, which is 5e-5 at 554 pixels. Distances of ground near the horizon have larger errors."""
 
 
 def is_needed(camera: Camera, weather: Weather) -> bool:

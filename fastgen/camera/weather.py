@@ -56,6 +56,8 @@ def add_fog(
     left = np.where(cover == 0, far, near)
     seen = _mixed(light, airlight, 1 - left)
     mixed = np.nonzero((cover > 0) & (cover < 255))
+    if not len(mixed[0]):
+        return seen
     share = cover[mixed][:, None] * np.float32(1 / 255)
     own = light[mixed]
     behind = _behind(light, cover, mixed, share)

@@ -1,8 +1,8 @@
 """Corrugated sheet whose ribs buckle along one line.
 
-A rib is stiff along its length and soft across it. Pushed in, it bends at one place, where its
-crest is crushed, and stays nearly straight on both sides; its neighbours bend beside it. The bend
-passes smoothly into the flat sheet. shaders/damage_buckled.glsl is the GLSL twin.
+A rib is stiff along its length. Pushed in, it bends at one place, where its crest is crushed, and
+stays nearly straight on both sides. Adjacent ribs bend at about the same height, so the bends form
+a line across the ribs. shaders/damage_buckled.glsl is the GLSL twin.
 """
 
 import numpy as np
@@ -13,7 +13,8 @@ from fastgen.scene import Damage
 from fastgen.scene.damage_kinds import LEAST, PHASE, Array, Form, Parameter, depth_span, half_size
 
 _PLACES = 1025
-"""Distances from the line, up to the length of the crushed part, at which `largest` looks."""
+"""Number of distances from the line, up to the length of the crushed part, at which `_largest`
+evaluates the displacement."""
 
 
 def _height(damage: Damage, u: Array, off: Array) -> Array:
@@ -24,9 +25,10 @@ def _height(damage: Damage, u: Array, off: Array) -> Array:
         u: Distance along the damage, across the ribs, [...] in mm.
         off: Distance from the line along the ribs, [...] in half widths.
     """
-    sharpness, _, tilt, wobble, *_ = damage.shape
-    reach = 1 - abs(tilt) - wobble  # so that the farthest bend ends at the damage's width
-    sides = lesser(-off, off, 2 * sharpness * reach)
+    rounding, _, tilt, wobble, *_ = damage.shape
+    # farthest bend from the line in half widths; the tilted line then stays within the width
+    reach = 1 - abs(tilt) - wobble
+    sides = lesser(-off, off, 2 * rounding * reach)
     return np.asarray(bump(u / half_size(damage)[0]) + sides / reach)
 
 
@@ -41,7 +43,7 @@ def _off(damage: Damage, u: Array, v: Array) -> Array:
 def _moved(damage: Damage, u: Array, off: Array, w: Array) -> Array:
     _, softness, *_, crushed, crushed_mm = damage.shape
     height = above_zero(_height(damage, u, off), softness)
-    here = crushed * bump(off * half_size(damage)[1] / crushed_mm) * np.minimum(height, 1.0)
+    here = crushed * bump(off * half_size(damage)[1] / crushed_mm) * height
     level = LEVEL_MM - np.clip(w, 0.0, DEEPEST_MM)
     return np.asarray(damage.depth_mm * height + here * level)
 
@@ -56,7 +58,7 @@ def _span(damage: Damage) -> tuple[float, float]:
 
 
 def _largest(damage: Damage) -> float:
-    """Return the displacement of the middle rib where it is largest, which is near the line."""
+    """Return the largest displacement, which is that of the middle rib, near the line."""
     _, half_width = half_size(damage)
     off = np.linspace(0, min(damage.shape[7] / half_width, 1.0), _PLACES)[:, None]
     moved = _moved(damage, np.zeros(1), off, np.array([0.0, DEEPEST_MM]))
@@ -65,16 +67,16 @@ def _largest(damage: Damage) -> float:
 
 BUCKLED = Form(
     name="buckled",
-    glsl="buckled",
+    glsl="buckled_ribs",
     shader="damage_buckled.glsl",
     amount=_buckled,
     span=_span,
     largest=_largest,
     parameters=(
-        Parameter("radius of the bend at the line, as a share of the reach", LEAST, 0.5),
-        Parameter("length over which the bend runs out, as a share of the reach", LEAST, 1.0),
-        Parameter("distance of the line's ends from its middle, in half widths", -0.5, 0.5),
-        Parameter("swings of the line, in half widths", 0.0, 0.4),
+        Parameter("length of the rounded bend at the line, as a share of the reach", LEAST, 0.5),
+        Parameter("length over which the bend fades out, as a share of the reach", LEAST, 1.0),
+        Parameter("offset of the line at the end of the length, in half widths", -0.5, 0.5),
+        Parameter("amplitude of the line's swings, in half widths", 0.0, 0.4),
         Parameter("wavelength of the swings in mm", 20.0, 1e5),
         PHASE,
         Parameter("share by which the corrugation is crushed at the line", 0.0, 1.0),

@@ -1,4 +1,4 @@
-"""Concave damage: an area of a face that is bowed inward or outward."""
+"""Concave damage: an area of a face that is pushed inward or outward."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -17,27 +17,29 @@ _CREASED_SIDES = Range(0.3, 0.95)
 """Distance of each side of a folded area from its middle, as a share of half its size."""
 
 _BEND, _RUN_OUT = Range(0.02, 0.2), Range(0.3, 0.9)
-"""Parameters of a buckled area: radius of the bend, and length over which it runs out."""
+"""Lengths over which the bend of a buckled area is rounded at its line and fades out, as shares of
+its reach."""
 
 _TILT, _SWINGS, _WAVELENGTH_MM = Range(-0.3, 0.3), Range(0.0, 0.12), Range(250.0, 900.0)
-"""Parameters of its line: distance of its ends from the middle, swings and their wavelength."""
+"""Its line: offset of the ends and amplitude of the swings in half widths, and their wavelength."""
 
 _CRUSHED, _CRUSHED_MM = Range(0.2, 1.0), Range(50.0, 160.0)
-"""Share by which its ribs are crushed at the line, and the length of the crushed parts."""
+"""Share by which its crests are crushed at the line, and length crushed on each side of it."""
 
 
 @dataclass(frozen=True)
 class ConcaveConfig:
-    """Area of a face that is bowed inward or outward.
+    """Area of a face that is pushed inward or outward.
 
     Attributes:
         length_mm: Horizontal size; along the container on the roof.
         width_mm: Vertical size; across the container on the roof.
-        depth_mm: Largest displacement.
+        depth_mm: Depth before bends and folds are rounded, which reduces the displacement.
         outward: Probability that the area bulges outward.
         at_bottom: Probability that a bulge is at the lower wall and ends at the bottom rail.
         buckled: Probability that the ribs buckle along one line.
-        creased: Probability that other sheet breaks into flat parts between sharp folds.
+        creased: Probability that an area that does not buckle breaks into flat parts between sharp
+            folds.
         crease_softness: Length over which a fold is rounded, as a share of the depth.
         flattened: Share by which the corrugation between the folds is flattened.
     """
@@ -54,9 +56,9 @@ class ConcaveConfig:
 
 
 def _draw(c: ConcaveConfig, face: str, size: Size, rng: np.random.Generator) -> SheetForm:
-    kind = rng.random()
-    buckled = kind < c.buckled
-    creased = not buckled and kind < c.buckled + c.creased * (1 - c.buckled)
+    chance = rng.random()
+    buckled = chance < c.buckled
+    creased = not buckled and chance < c.buckled + c.creased * (1 - c.buckled)
     length = draw(rng, c.length_mm, size[0] - 2 * FRAME_MM)
     width = draw(rng, c.width_mm, size[1] - 2 * FRAME_MM)
     depth = draw(rng, c.depth_mm)

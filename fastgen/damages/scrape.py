@@ -67,7 +67,7 @@ class ScrapeConfig:
         contact_mm: Depth behind the outermost sheet up to which it is scraped. Small values leave
             the troughs of the corrugation alone.
         paint: Probability that the scratches show the paint of another object.
-        beside: Probability that a dent or a bowed area has a scrape beside it. It applies where
+        beside: Probability that a dent or a concave area has a scrape beside it. It applies where
             `kinds` has scrapes.
     """
 

@@ -1,6 +1,6 @@
 """The artwork of recent scenes as a texture array."""
 
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Collection, Mapping, Sequence
 
 import moderngl
@@ -12,9 +12,9 @@ from fastgen.files import disk_cache
 from fastgen.render.gl import GLContext
 from fastgen.render.textures import fill_layers, levelled_storage
 
-_FIRST_ROOM = 96
-"""Layers at first, 32 MiB. Three scenes with one container, which the renderer keeps for a moment,
-use about 80."""
+_INITIAL_LAYERS = 96
+"""Initial number of layers, 32 MiB. The current scene and the two scenes kept before it use about
+80 if each has one container."""
 
 
 class ArtTextures:
@@ -24,55 +24,71 @@ class ArtTextures:
     until their place is needed.
 
     Attributes:
-        texture: The texture array. It is replaced when it has to grow.
+        texture: The texture array. `take` replaces it when it has to grow.
     """
 
     def __init__(
-        self, gl: GLContext, own: Mapping[str, NDArray[np.uint8]], room: int = _FIRST_ROOM
+        self,
+        gl: GLContext,
+        own: Mapping[str, NDArray[np.uint8]],
+        capacity: int = _INITIAL_LAYERS,
     ) -> None:
         """Allocate the layers.
 
         Args:
             gl: Current context.
-            own: Further artwork by name, uint8 [ART_SIZE, ART_SIZE, 4] with straight alpha.
-            room: Number of layers at first.
+            own: Artwork of the configuration by name, uint8 [ART_SIZE, ART_SIZE, 4] with straight
+                alpha.
+            capacity: Initial number of layers.
         """
         self._gl = gl
         self._bundled = art_layers()
         self._own = {name: _own_levels(image) for name, image in own.items()}
-        self._places: dict[str, int] = {}
-        self._users: dict[str, int] = {}
+        self._layers: dict[str, int] = {}
+        self._use_counts: Counter[str] = Counter()
         self._unused: OrderedDict[str, None] = OrderedDict()
-        self._free = list(range(room))[::-1]
-        self._room = room
-        self.texture = self._allocated()
+        self._free = list(range(capacity))[::-1]
+        self._capacity = capacity
+        self.texture = self._allocated(capacity)
+        _unmap()
 
     def take(self, names: Collection[str]) -> Mapping[str, int]:
-        """Return the layer of each artwork, which stays until `give_back`.
+        """Reserve a layer for each artwork until `give_back`, and return the layers by name.
+
+        It may replace `texture`.
 
         Args:
             names: Names of artwork; other names are left out.
         """
         known = [name for name in sorted(names) if name in self._bundled or name in self._own]
-        for name in known:
-            self._users[name] = self._users.get(name, 0) + 1
-            self._unused.pop(name, None)
-        missing = [name for name in known if name not in self._places]
-        if len(missing) > len(self._free) + len(self._unused):
-            self._grow(len(self._users))
+        missing = [name for name in known if name not in self._layers]
+        kept = [name for name in self._unused if name not in known]
+        if len(missing) > len(self._free) + len(kept):
+            self._grow(len(self._use_counts.keys() | set(known)))
         for name in missing:
             if not self._free:
-                self._free.append(self._places.pop(self._unused.popitem(last=False)[0]))
-            self._places[name] = self._free.pop()
-            self._fill(name)
-        return {name: self._places[name] for name in known}
+                oldest = kept.pop(0)
+                del self._unused[oldest]
+                self._free.append(self._layers.pop(oldest))
+            self._fill(name, self._free[-1])
+            self._layers[name] = self._free.pop()
+        if missing:
+            _unmap()
+        for name in known:
+            self._use_counts[name] += 1
+            self._unused.pop(name, None)
+        return {name: self._layers[name] for name in known}
 
     def give_back(self, names: Collection[str]) -> None:
-        """Say that a scene needs its layers no more; the names are those of its `take`."""
+        """Release the layers that one `take` returned.
+
+        Args:
+            names: Keys of the mapping that `take` returned.
+        """
         for name in names:
-            self._users[name] -= 1
-            if not self._users[name]:
-                del self._users[name]
+            self._use_counts[name] -= 1
+            if not self._use_counts[name]:
+                del self._use_counts[name]
                 self._unused[name] = None
 
     def release(self) -> None:
@@ -80,34 +96,36 @@ class ArtTextures:
         self.texture.release()
 
     def _grow(self, needed: int) -> None:
-        """Replace the texture by one with room for more layers, and fill those in use."""
-        room = self._room
-        while room < needed:
-            room *= 2
-        room = min(room, len(self._bundled) + len(self._own))
-        self._free += range(self._room, room)
-        self._room = room
+        """Replace the texture by one with more layers, and fill those in use."""
+        capacity = self._capacity
+        while capacity < needed:
+            capacity *= 2
+        capacity = min(capacity, len(self._bundled) + len(self._own))
+        larger = self._allocated(capacity)
         self.texture.release()
-        self.texture = self._allocated()
-        for name in self._places:
-            self._fill(name)
+        self.texture = larger
+        self._free += range(self._capacity, capacity)
+        self._capacity = capacity
+        for name, layer in self._layers.items():
+            self._fill(name, layer)
 
-    def _allocated(self) -> moderngl.TextureArray:
+    def _allocated(self, capacity: int) -> moderngl.TextureArray:
         sizes = [level.shape[1] for level in art_levels()]
-        return levelled_storage(self._gl, (sizes[0], self._room), len(sizes), srgb=True)
+        return levelled_storage(self._gl, (sizes[0], capacity), len(sizes), srgb=True)
 
-    def _fill(self, name: str) -> None:
-        fill_layers(self._gl, self.texture, self._places[name], self._levels(name))
-
-    def _levels(self, name: str) -> Sequence[NDArray[np.uint8]]:
+    def _fill(self, name: str, layer: int) -> None:
         if name in self._own:
-            return self._own[name]
-        layer = self._bundled[name]
-        found = [level[layer : layer + 1].copy() for level in art_levels()]
-        for level in art_levels():  # other processes read the same file
-            disk_cache.unload(level)
-        return found
+            levels = self._own[name]
+        else:
+            stored = self._bundled[name]
+            levels = [level[stored : stored + 1] for level in art_levels()]
+        fill_layers(self._gl, self.texture, layer, levels)
 
 
 def _own_levels(image: NDArray[np.uint8]) -> Sequence[NDArray[np.uint8]]:
     return [premultiplied(level[None]) for level in (image, *mip_levels(image))]
+
+
+def _unmap() -> None:
+    """Take the pages of the stored artwork, all in one file, out of this process's memory."""
+    disk_cache.unload(art_levels()[0])

@@ -151,6 +151,8 @@ class Renderer:
         scene = prepared.scene
         self._compile_for(prepared)
         self._materials.release_old(len(prepared.members))
+        for each in prepared.members:  # their artwork may replace a texture, which inputs hold
+            self._materials.resources(each.prepared)
         exposure = self._lights.exposure(scene, camera, view).factor
         several = bool(scene.neighbours or scene.ground)
         options = DrawOptions(layer, radiance, over=several)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.art_textures import ArtTextures
 from fastgen.render.constants import DECAL_CELL_MM
-from fastgen.render.decal_tables import MARGIN_MM, SceneError, pack_decals
+from fastgen.render.decal_tables import MARGIN_MM, pack_decals
 from fastgen.render.decals_near import decals_near
 from fastgen.render.glyph_runs import GlyphTable
 from fastgen.render.surface_values import SceneMaterials
@@ -98,7 +98,7 @@ class SceneResources:
         self._decals: dict[float, DecalTextures] = {}
         try:
             self.decals()
-        except SceneError:
+        except BaseException:
             self.release()
             raise
 
