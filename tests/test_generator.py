@@ -254,7 +254,7 @@ def test_threads_that_share_a_generator_render_in_turn(generators, backend):
     shared = generators(size=SIZE, backend=backend, quality="draft")
     expected = [shared.render(index=index).image for index in range(4)]
     with ThreadPoolExecutor(3) as pool:
-        found = pool.map(lambda k: shared.render(index=k % 4).image, range(24))
+        found = pool.map(lambda k: shared.render(index=k % 4).image, range(12))
     for k, image in enumerate(found):
         np.testing.assert_array_equal(image, expected[k % 4])
 
