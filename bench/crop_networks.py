@@ -120,7 +120,7 @@ def fit_pairs(
     torch.manual_seed(seed)
     model = Classifier(2)
     count = 32
-    targets = torch.arange(2 * count) < count
+    targets = (torch.arange(2 * count) < count).long()
     sides = torch.from_numpy(positive), torch.from_numpy(negative)
 
     def loss() -> torch.Tensor:
@@ -129,7 +129,7 @@ def fit_pairs(
         with torch.random.fork_rng(devices=[]):
             ones = _varied(ones)
         crops = torch.cat([ones, _varied(others)])
-        return functional.cross_entropy(model(crops), targets.long(), label_smoothing=0.05)
+        return functional.cross_entropy(model(crops), targets, label_smoothing=0.05)
 
     _optimize(model, loss, steps)
     return model

@@ -24,13 +24,12 @@ DamageField buckled_ribs_field(int i, vec3 q) {
     float s = off * half_width / b.w;
     float crushed = b.z * bump(s);
     vec2 crushed_slope = b.z * bump_slope(s) * half_width / b.w * off_slope;
-    float level = CREASED_LEVEL_MM - clamp(q.z, 0.0, CREASED_DEEPEST_MM);
+    float level = to_flat(q.z);
     vec2 more = level * (crushed_slope * up + crushed * tilt);
-    float through = q.z > 0.0 && q.z < CREASED_DEEPEST_MM ? -crushed * up : 0.0;
     float sheet = sheet_fade(q.z);
     // Paint cracks along the line, only on the crests.
-    float rubbed = clamp(1.0 - q.z / CREASED_LEVEL_MM, 0.0, 1.0) * bump(s) * min(2.0 * up, 1.0);
+    float rubbed = clamp(1.0 - q.z / DAMAGE_FLAT_MM, 0.0, 1.0) * bump(s) * min(2.0 * up, 1.0);
     return DamageField(sheet * (depth * up + crushed * up * level),
-                       sheet * vec3(depth * tilt + more, through),
+                       sheet * vec3(depth * tilt + more, crushed * up * to_flat_slope(q.z)),
                        0.5 * sheet * rubbed);
 }

@@ -28,10 +28,9 @@ DamageField creased_field(int i, vec3 q) {
     vec2 tilt = height.yz * above_zero_slope(height.x, b.z);
     float up = above_zero(height.x, b.z);
     float flattened = b.w * min(up / CREASED_FLATTENED_AT, 1.0);
-    float level = CREASED_LEVEL_MM - clamp(q.z, 0.0, CREASED_DEEPEST_MM);
+    float level = to_flat(q.z);
     vec2 more = up < CREASED_FLATTENED_AT ? b.w * level / CREASED_FLATTENED_AT * tilt : vec2(0.0);
-    float through = q.z > 0.0 && q.z < CREASED_DEEPEST_MM ? -flattened : 0.0;
     return DamageField(sheet * (depth * up + flattened * level),
-                       sheet * vec3(depth * tilt + more, through),
+                       sheet * vec3(depth * tilt + more, flattened * to_flat_slope(q.z)),
                        0.3 * sheet * clamp(1.0 - scar / 0.03, 0.0, 1.0) * step(1e-4, up));
 }

@@ -49,6 +49,10 @@ float sheet_fade(float w) {
     return 1.0 - smoothstep(DAMAGE_FADE_START_MM, DAMAGE_FADE_END_MM, abs(w));
 }
 
+// Displacement that flattens corrugation, for sheet w mm behind its face, and its derivative.
+float to_flat(float w) { return DAMAGE_FLAT_MM - clamp(w, 0.0, DAMAGE_DEEPEST_MM); }
+float to_flat_slope(float w) { return w > 0.0 && w < DAMAGE_DEEPEST_MM ? -1.0 : 0.0; }
+
 // Whether a surface w mm behind its face is near enough to be marked.
 bool in_contact(float w, float contact_mm) { return w < contact_mm && w > -DAMAGE_PROUD_MM; }
 

@@ -338,3 +338,21 @@ def test_art_textures_hold_the_artwork_of_the_scenes_that_use_it():
                     assert layers.setdefault(layer, name) == name
         assert len(sizes) > 1
         textures.release()
+
+
+def test_artwork_stays_until_each_scene_has_given_it_back():
+    names = list(art_layers())
+    with open_context() as gl:
+        textures = ArtTextures(gl, {}, capacity=4)
+        first, second = textures.take(names[:4]), textures.take(names[:4])
+        textures.give_back(first)
+        third = textures.take(names[4:5])
+        texels = stored_layers(gl, textures.texture)
+        for name, layer in {**second, **third}.items():
+            np.testing.assert_array_equal(texels[layer], art_levels()[0][art_layers()[name]])
+        assert len(texels) == 8
+        for each in (second, third):
+            textures.give_back(each)
+        textures.take(names[5:13])
+        assert len(stored_layers(gl, textures.texture)) == 8
+        textures.release()

@@ -29,6 +29,7 @@ from fastgen.scene import Scene
 from tests.backends import needs_osmesa
 from tests.folders import content
 from tests.in_process import no_workers
+from tests.interruptible import interruptible
 
 SMALL = RenderSettings((64, 64))
 ARGUMENTS = ["--images", "14", "--size", "96x80", "--seed", "3"]
@@ -340,14 +341,7 @@ def test_a_second_run_on_the_same_folder_is_refused(dataset, tmp_path, capsys):
 def test_ctrl_c_stops_cleanly_and_the_run_can_be_continued(dataset, tmp_path):
     out = tmp_path / "out"
     command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS]
-    process = subprocess.Popen(
-        command,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        # background jobs of a shell, such as this test run, may ignore SIGINT
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+    process = interruptible(command, stderr=subprocess.PIPE, start_new_session=True)
     deadline = time.monotonic() + 60
     while not (out / "dataset.json").exists() and time.monotonic() < deadline:
         time.sleep(0.02)

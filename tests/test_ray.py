@@ -23,6 +23,7 @@ from fastgen.errors import OutputError
 from fastgen.render.settings import RenderSettings
 from tests.crash_run import FAULTY_SCENE, QuickMaker
 from tests.folders import content
+from tests.interruptible import interruptible
 from tests.ray_makers import (
     HANG_S,
     HANGING_SCENE,
@@ -155,12 +156,8 @@ runpy.run_module("fastgen", run_name="__main__", alter_sys=True)
 
 def run_alone(out, *more):
     command = [sys.executable, "-c", WITHOUT_RENDERING, "generate", str(out), "--images", "400"]
-    return subprocess.Popen(
-        [*command, "--size", "64x64", *more],
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    return interruptible(
+        [*command, "--size", "64x64", *more], stderr=subprocess.PIPE, start_new_session=True
     )
 
 

@@ -26,6 +26,7 @@ from fastgen.light.hdri import bundled_hdris
 from fastgen.studio.changes import bases, values_of
 from fastgen.studio.drawing import Drawing, Superseded, Wanted
 from fastgen.studio.server import Studio, listening
+from tests.interruptible import interruptible
 
 SIZE = (160, 128)
 TOKEN = "secret-token"
@@ -316,14 +317,7 @@ def test_closing_ends_what_still_waits():
 def test_a_signal_ends_the_server_cleanly_even_while_it_draws(number):
     words = [sys.executable, "-m", "fastgen", "studio", "--no-browser", "--size", "64x64"]
     pipe = subprocess.PIPE
-    with subprocess.Popen(
-        words,
-        stdout=pipe,
-        stderr=pipe,
-        text=True,
-        # background jobs of a shell, such as this test run, may ignore SIGINT
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as server:
+    with interruptible(words, stdout=pipe, stderr=pipe) as server:
         address = re.search(r"http://\S+/", server.stdout.readline())[0]
         connection = http.client.HTTPConnection(address.split("/")[2])
         # the first image takes seconds, so the signal comes while it is drawn

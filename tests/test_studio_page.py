@@ -14,6 +14,7 @@ from playwright.sync_api import expect
 from screenshots import SLOW_MS, chromium
 
 from fastgen import Config, Generator
+from tests.interruptible import interruptible
 
 SIZE = (320, 240)
 
@@ -25,14 +26,7 @@ def address():
     words = ["studio", "--no-browser", "--seed", "7", "--size", size]
     command = [sys.executable, "-m", "fastgen", *words]
     pipe = subprocess.PIPE
-    with subprocess.Popen(
-        command,
-        stdout=pipe,
-        stderr=pipe,
-        text=True,
-        # background jobs of a shell, such as this test run, may ignore SIGINT
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as server:
+    with interruptible(command, stdout=pipe, stderr=pipe) as server:
         try:
             yield re.search(r"http://127\.0\.0\.1:\d+/\S+/", server.stdout.readline())[0]
         finally:

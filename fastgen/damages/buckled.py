@@ -7,8 +7,7 @@ a line across the ribs. shaders/damage_buckled.glsl is the GLSL twin.
 
 import numpy as np
 
-from fastgen.damages.creased import DEEPEST_MM, LEVEL_MM
-from fastgen.damages.fields import above_zero, bump, lesser
+from fastgen.damages.fields import DEEPEST_MM, FLAT_MM, above_zero, bump, lesser, to_flat
 from fastgen.scene import Damage
 from fastgen.scene.damage_kinds import LEAST, PHASE, Array, Form, Parameter, depth_span, half_size
 
@@ -44,8 +43,7 @@ def _moved(damage: Damage, u: Array, off: Array, w: Array) -> Array:
     _, softness, *_, crushed, crushed_mm = damage.shape
     height = above_zero(_height(damage, u, off), softness)
     here = crushed * bump(off * half_size(damage)[1] / crushed_mm) * height
-    level = LEVEL_MM - np.clip(w, 0.0, DEEPEST_MM)
-    return np.asarray(damage.depth_mm * height + here * level)
+    return np.asarray(damage.depth_mm * height + here * to_flat(w))
 
 
 def _buckled(damage: Damage, u: Array, v: Array, w: Array) -> Array:
@@ -54,7 +52,7 @@ def _buckled(damage: Damage, u: Array, v: Array, w: Array) -> Array:
 
 def _span(damage: Damage) -> tuple[float, float]:
     low, high = depth_span(damage)
-    return low, high + damage.shape[6] * LEVEL_MM
+    return low, high + damage.shape[6] * FLAT_MM
 
 
 def _largest(damage: Damage) -> float:

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fastgen.damages.fields import SOFTNESS, above_zero, lesser
+from fastgen.damages.fields import DEEPEST_MM, FLAT_MM, SOFTNESS, above_zero, lesser, to_flat
 from fastgen.scene import Damage
 from fastgen.scene.damage_kinds import PHASE, Array, Form, Parameter, depth_span, half_size
 
@@ -19,10 +19,6 @@ is at 1."""
 
 FLATTENED_AT = 0.4
 """Height of the pyramid, as a share of its apex, from which the corrugation is fully flattened."""
-
-LEVEL_MM, DEEPEST_MM = 18.0, 48.0
-"""Depth behind the outermost sheet to which the corrugation is flattened, and depth of the deepest
-sheet that is flattened. Gear in front of the sheet moves like the crests of the sheet."""
 
 
 def _folded(shape: tuple[float, ...], x: Array, y: Array) -> Array:
@@ -42,13 +38,12 @@ def _creased(damage: Damage, u: Array, v: Array, w: Array) -> Array:
         _folded(damage.shape, u / half_length, v / half_width), damage.shape[1 + SIDES]
     )
     flattened = damage.shape[2 + SIDES] * np.minimum(height / FLATTENED_AT, 1.0)
-    level = LEVEL_MM - np.clip(w, 0.0, DEEPEST_MM)
-    return np.asarray(damage.depth_mm * height + flattened * level)
+    return np.asarray(damage.depth_mm * height + flattened * to_flat(w))
 
 
 def _span(damage: Damage) -> tuple[float, float]:
     low, high = depth_span(damage)
-    return low, high + damage.shape[2 + SIDES] * LEVEL_MM
+    return low, high + damage.shape[2 + SIDES] * FLAT_MM
 
 
 def _largest(damage: Damage) -> float:
@@ -60,8 +55,8 @@ def _largest(damage: Damage) -> float:
     apex = _apex(damage.shape)
     height = np.array([[min(FLATTENED_AT, apex)], [apex]])
     flattened = damage.shape[2 + SIDES] * height / FLATTENED_AT
-    level = np.array([LEVEL_MM, LEVEL_MM - DEEPEST_MM])
-    moved = damage.depth_mm * height + np.minimum(flattened, damage.shape[2 + SIDES]) * level
+    ends = to_flat(np.array([0.0, DEEPEST_MM]))
+    moved = damage.depth_mm * height + np.minimum(flattened, damage.shape[2 + SIDES]) * ends
     return float(np.abs(moved).max())
 
 
@@ -102,7 +97,5 @@ CREASED = Form(
     constants={
         "CREASED_EDGE": f"{EDGE_STEEPNESS:.1f}",
         "CREASED_FLATTENED_AT": f"{FLATTENED_AT:g}",
-        "CREASED_LEVEL_MM": f"{LEVEL_MM:.1f}",
-        "CREASED_DEEPEST_MM": f"{DEEPEST_MM:.1f}",
     },
 )

@@ -47,6 +47,16 @@ def lesser(a: Array, b: Array, softness: float) -> Array:
     return np.asarray(b + (a - b) * t - softness * t * (1 - t))
 
 
+FLAT_MM, DEEPEST_MM = 18.0, 48.0
+"""Depth behind the outermost sheet to which corrugation is flattened, and depth of the deepest
+sheet that is flattened. Gear in front of the sheet moves like the crests of the sheet."""
+
+
+def to_flat(w: Array) -> Array:
+    """Return the displacement [...] that flattens corrugation, for sheet at w [...]."""
+    return np.asarray(FLAT_MM - np.clip(w, 0.0, DEEPEST_MM))
+
+
 PROUD_MM = 25.0
 """Distance in front of the face up to which parts are marked; locking bars stand farther out."""
 

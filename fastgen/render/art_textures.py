@@ -1,6 +1,6 @@
 """The artwork of recent scenes as a texture array."""
 
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 import moderngl
@@ -44,11 +44,9 @@ class ArtTextures:
         self._gl = gl
         self._bundled = art_layers()
         self._own = {name: _own_levels(image) for name, image in own.items()}
-        self._layers: dict[str, int] = {}
+        self._layers: dict[str, int] = {}  # those taken last come last
         self._use_counts: Counter[str] = Counter()
-        self._unused: OrderedDict[str, None] = OrderedDict()
         self._free = list(range(capacity))[::-1]
-        self._capacity = capacity
         self.texture = self._allocated(capacity)
         _unmap()
 
@@ -62,22 +60,20 @@ class ArtTextures:
         """
         known = [name for name in sorted(names) if name in self._bundled or name in self._own]
         missing = [name for name in known if name not in self._layers]
-        kept = [name for name in self._unused if name not in known]
-        if len(missing) > len(self._free) + len(kept):
+        unused = [n for n in self._layers if n not in self._use_counts and n not in known]
+        if len(missing) > len(self._free) + len(unused):
             self._grow(len(self._use_counts.keys() | set(known)))
         for name in missing:
             if not self._free:
-                oldest = kept.pop(0)
-                del self._unused[oldest]
-                self._free.append(self._layers.pop(oldest))
+                self._free.append(self._layers.pop(unused.pop(0)))
             self._fill(name, self._free[-1])
             self._layers[name] = self._free.pop()
         if missing:
             _unmap()
-        for name in known:
-            self._use_counts[name] += 1
-            self._unused.pop(name, None)
-        return {name: self._layers[name] for name in known}
+        self._use_counts.update(known)
+        taken = {name: self._layers.pop(name) for name in known}
+        self._layers.update(taken)
+        return taken
 
     def give_back(self, names: Collection[str]) -> None:
         """Release the layers that one `take` returned.
@@ -85,11 +81,7 @@ class ArtTextures:
         Args:
             names: Keys of the mapping that `take` returned.
         """
-        for name in names:
-            self._use_counts[name] -= 1
-            if not self._use_counts[name]:
-                del self._use_counts[name]
-                self._unused[name] = None
+        self._use_counts -= Counter(list(names))  # which drops those that no scene uses
 
     def release(self) -> None:
         """Free the texture."""
@@ -97,15 +89,14 @@ class ArtTextures:
 
     def _grow(self, needed: int) -> None:
         """Replace the texture by one with more layers, and fill those in use."""
-        capacity = self._capacity
+        before = capacity = len(self._layers) + len(self._free)
         while capacity < needed:
             capacity *= 2
         capacity = min(capacity, len(self._bundled) + len(self._own))
         larger = self._allocated(capacity)
         self.texture.release()
         self.texture = larger
-        self._free += range(self._capacity, capacity)
-        self._capacity = capacity
+        self._free += range(before, capacity)
         for name, layer in self._layers.items():
             self._fill(name, layer)
 

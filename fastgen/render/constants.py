@@ -243,6 +243,8 @@ def _damage(v: ShaderVariant) -> Defines:
         "DAMAGE_FADE_START_MM": f"{fields.FADE_START_MM:.1f}",
         "DAMAGE_FADE_END_MM": f"{fields.FADE_END_MM:.1f}",
         "DAMAGE_PROUD_MM": f"{fields.PROUD_MM:.1f}",
+        "DAMAGE_FLAT_MM": f"{fields.FLAT_MM:.1f}",
+        "DAMAGE_DEEPEST_MM": f"{fields.DEEPEST_MM:.1f}",
         "REACH_MARGIN_MM": f"{REACH_MARGIN_MM:.1f}",
         **{name: value for form in forms for name, value in form.constants.items()},
         "EACH_DAMAGE(USE)": " ".join(moving),
