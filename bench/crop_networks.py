@@ -99,7 +99,7 @@ def fit_classifier(
         crops = _varied(_input(data[chosen]))
         return functional.cross_entropy(model(crops), targets[chosen], label_smoothing=0.05)
 
-    _optimize(model, loss, steps)
+    optimize(model, loss, steps)
     return model
 
 
@@ -131,7 +131,7 @@ def fit_pairs(
         crops = torch.cat([ones, _varied(others)])
         return functional.cross_entropy(model(crops), targets, label_smoothing=0.05)
 
-    _optimize(model, loss, steps)
+    optimize(model, loss, steps)
     return model
 
 
@@ -146,7 +146,7 @@ def fit_reader(texts: Sequence[Text], steps: int, seed: int) -> Reader:
     torch.manual_seed(seed)
     model = Reader()
     batches = _text_batches(texts, np.random.default_rng(seed))
-    _optimize(model, lambda: model.text_loss(next(batches)), steps)
+    optimize(model, lambda: model.text_loss(next(batches)), steps)
     return model
 
 
@@ -162,7 +162,7 @@ def _text_batches(
 
 
 def _varied(crops: torch.Tensor) -> torch.Tensor:
-    """Randomly rotate, scale, shift, blur and tint crops [B, 3, S, S] in 0..1, and add noise."""
+    """Randomly rotate, scale and shift crops [B, 3, S, S] in 0..1, and vary their tones."""
     count, _, side, _ = crops.shape
 
     def drawn(spread: float, *shape: int) -> torch.Tensor:
@@ -176,20 +176,29 @@ def _varied(crops: torch.Tensor) -> torch.Tensor:
         1,
     )
     grid = functional.affine_grid(maps, [count, 3, side, side], align_corners=False)
-    crops = functional.grid_sample(crops, grid, padding_mode="border", align_corners=False)
-    soft = functional.avg_pool2d(crops, 3, 1, 1, count_include_pad=False)
+    return toned(functional.grid_sample(crops, grid, padding_mode="border", align_corners=False))
+
+
+def toned(images: torch.Tensor) -> torch.Tensor:
+    """Randomly blur images [B, 3, H, W] in 0..1, change their tones, and add noise."""
+    count = len(images)
+
+    def drawn(spread: float, *shape: int) -> torch.Tensor:
+        return spread * torch.randn(count, *shape)
+
+    soft = functional.avg_pool2d(images, 3, 1, 1, count_include_pad=False)
     softness = torch.rand(count, 1, 1, 1) * (torch.rand(count, 1, 1, 1) < 0.5)
-    crops = crops + softness * (soft - crops)
-    crops = crops.clamp(1e-3, 1) ** torch.exp(drawn(0.3, 1, 1, 1))
-    crops = crops * (1 + drawn(0.06, 3, 1, 1)) + drawn(0.03, 3, 1, 1)
-    return crops + torch.rand(count, 1, 1, 1) * 0.03 * torch.randn_like(crops)
+    images = images + softness * (soft - images)
+    images = images.clamp(1e-3, 1) ** torch.exp(drawn(0.3, 1, 1, 1))
+    images = images * (1 + drawn(0.06, 3, 1, 1)) + drawn(0.03, 3, 1, 1)
+    return images + torch.rand(count, 1, 1, 1) * 0.03 * torch.randn_like(images)
 
 
 def _input(pixels: torch.Tensor) -> torch.Tensor:
     return pixels.permute(0, 3, 1, 2).float() / 255
 
 
-def _optimize(model: nn.Module, loss: Any, steps: int, rate: float = 3e-3) -> None:
+def optimize(model: nn.Module, loss: Any, steps: int, rate: float = 3e-3) -> None:
     """Minimize `loss()` with AdamW and one cycle of the learning rate."""
     model.train()
     # this memory format saves a fifth of the time on CPUs

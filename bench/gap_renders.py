@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
+from real_crops import BoxedImage
+from rendered_boxes import boxed_renders
 from rendered_crops import Crops, Text, training_crops
 from rendered_views import View, default_texts, default_views
 
@@ -31,6 +33,7 @@ class Effort:
         marker_steps: Training steps of the marker classifier.
         reader_steps: Training steps of the reader.
         damage_steps: Training steps of the damage classifier.
+        box_steps: Training steps of the detector of containers.
     """
 
     scenes: int = 300
@@ -40,6 +43,7 @@ class Effort:
     marker_steps: int = 700
     reader_steps: int = 900
     damage_steps: int = 1500
+    box_steps: int = 1500
 
 
 class Renders:
@@ -54,34 +58,50 @@ class Renders:
 
     def __init__(self, seed: int, effort: Effort, workers: int, kinds: Sequence[str]) -> None:
         self._seed, self._effort, self._workers, self._kinds = seed, effort, workers, kinds
-        self._group = cache(self._rendered_group)
+        self._crops = cache(self._rendered_crops)
+        self._boxed = cache(self._rendered_boxes)
         self.views = cache(self._rendered_views)
 
     def crops(self, seed: int) -> Crops:
         """Return the training crops of one seed."""
         found = Crops()
-        for group in range(GROUPS):
-            if group != seed % GROUPS:
-                found.add(self._group(group))
+        for scenes in self._training_scenes(seed):
+            found.add(self._crops(scenes))
         return found
 
-    def _rendered_group(self, group: int) -> Crops:
-        size = -(-self._effort.scenes // (GROUPS - 1))
-        return self._crops(range(group * size, (group + 1) * size))
-
-    @cached_property
+    @property
     def held_out(self) -> Crops:
         """Crops of other scenes of the same kind."""
-        return self._crops(range(HELD_OUT, HELD_OUT + self._effort.held_out))
+        return self._crops(self._held_out_scenes)
 
-    def _crops(self, scenes: range) -> Crops:
+    def boxed(self, seed: int) -> list[BoxedImage]:
+        """Return the training images of one seed with boxes of containers."""
+        return [image for scenes in self._training_scenes(seed) for image in self._boxed(scenes)]
+
+    @property
+    def held_out_boxed(self) -> list[BoxedImage]:
+        """Images of other scenes with boxes of containers."""
+        return self._boxed(self._held_out_scenes)
+
+    def _training_scenes(self, seed: int) -> list[range]:
+        size = -(-self._effort.scenes // (GROUPS - 1))
+        groups = [range(group * size, (group + 1) * size) for group in range(GROUPS)]
+        return [scenes for group, scenes in enumerate(groups) if group != seed % GROUPS]
+
+    @property
+    def _held_out_scenes(self) -> range:
+        return range(HELD_OUT, HELD_OUT + self._effort.held_out)
+
+    def _rendered_crops(self, scenes: range) -> Crops:
         return training_crops(self._seed, scenes, self._kinds, self._workers)
+
+    def _rendered_boxes(self, scenes: range) -> list[BoxedImage]:
+        return boxed_renders(self._seed, scenes, self._workers)
 
     @cached_property
     def texts(self) -> list[Text]:
         """Held-out identifiers as the preset's own cameras see them."""
-        scenes = range(HELD_OUT, HELD_OUT + self._effort.held_out)
-        return default_texts(self._seed, scenes, self._workers)
+        return default_texts(self._seed, self._held_out_scenes, self._workers)
 
     def _rendered_views(self, preset: str) -> list[View]:
         """Return held-out images of a preset."""

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from box_detector import ap50, best_score, counts, detect, fit_detector
 from crop_networks import Classifier, fit_classifier, fit_pairs, fit_reader
 from crop_statistics import (
     Array,
@@ -27,6 +28,7 @@ from marker_search import overlap, search, true_scores
 from numpy.typing import NDArray
 from panel_crops import PANEL_PX, Pixels, change_of, square_crop
 from real_crops import DAMAGE_KINDS, LAYOUTS, PanelPair, RealCrops
+from rendered_boxes import PRESETS
 from rendered_crops import MARKER_PX, Crops
 from text import edit_distance
 
@@ -240,6 +242,30 @@ def _by_kind_and_change(damaged: Array, undamaged: Array, pairs: Sequence[PanelP
     }
 
 
+def containers(trial: Trial) -> Measures:
+    """Return AP50 of a detector of containers on ours and theirs, and recall at one score.
+
+    The score is the one with the best F1 on held-out renders.
+    """
+    model = fit_detector(trial.renders.boxed(trial.seed), trial.effort.box_steps, trial.seed)
+    mine = trial.renders.held_out_boxed
+    groups = {
+        "ours, held out": mine,
+        **{f"ours, held out, {name}": [v for v in mine if v.preset == name] for name in PRESETS},
+        "theirs": trial.real.boxed,
+    }
+    seen = {name: detect(model, images) for name, images in groups.items()}
+    found: Measures = {f"{name}, AP50": ap50(each) for name, each in seen.items()}
+    least = best_score(seen["ours, held out"])
+    found["score"] = Count(least)
+    for name, each in seen.items():
+        right, all_found, labels = counts(each, least)
+        found[f"{name}, recall"] = Share(right, labels)
+        if all_found:
+            found[f"{name}, precision"] = Share(right, all_found)
+    return found
+
+
 def image_statistics(trial: Trial) -> Measures:
     """Return AUCs of telling our pictures from theirs, of all statistics together and of each."""
     found: Measures = {}
@@ -286,6 +312,7 @@ SECTIONS: Mapping[str, Callable[[Trial], Measures]] = {
     "identifiers": identifiers,
     "false": false_markers,
     "damage": damage,
+    "containers": containers,
     "statistics": image_statistics,
 }
 """Sections that are measured with each seed, by their name on the command line."""

@@ -1,7 +1,7 @@
 """Labelled real pictures in a folder, for measuring only.
 
 docs/benchmarks.md describes the layout of the folder. Every part may be missing, and further
-columns of its tables are ignored.
+columns of its tables and keys of its COCO file are ignored.
 """
 
 import csv
@@ -13,6 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ValidationError
 
 from fastgen.classes import MARKER_CLASSES
 from fastgen.decals.iso6346 import check_digit
@@ -70,6 +71,23 @@ class PanelPair:
 
 
 @dataclass(frozen=True, eq=False)
+class BoxedImage:
+    """Photograph or render with the visible boxes of its containers.
+
+    Attributes:
+        pixels: The picture.
+        boxes: Boxes x0, y0, x1, y1 in pixels [N, 4], float64.
+        ignored: Boxes that need not be found and whose detection is not wrong, bool [N].
+        preset: Preset of a render, '' for a photograph.
+    """
+
+    pixels: Pixels
+    boxes: NDArray[np.float64]
+    ignored: NDArray[np.bool_]
+    preset: str = ""
+
+
+@dataclass(frozen=True, eq=False)
 class RealCrops:
     """Everything that a folder holds. Parts that it does not have are empty."""
 
@@ -77,6 +95,7 @@ class RealCrops:
     identifiers: tuple[RealIdentifier, ...]
     panels: tuple[PanelPair, ...]
     photos: tuple[Pixels, ...]
+    boxed: tuple[BoxedImage, ...]
 
 
 def load_real(folder: Path) -> RealCrops:
@@ -84,7 +103,7 @@ def load_real(folder: Path) -> RealCrops:
 
     Raises:
         ConfigError: The folder is missing or has none of the parts, a picture is missing, or a row
-            has an invalid value. The message names the file and the row.
+            or an annotation has an invalid value. The message names the file and the place in it.
     """
     if not folder.is_dir():
         raise ConfigError(f"{folder}: there is no such folder")
@@ -93,11 +112,12 @@ def load_real(folder: Path) -> RealCrops:
         tuple(_identifiers(folder)),
         tuple(_panels(folder)),
         tuple(_photos(folder / "look")),
+        tuple(_boxed(folder)),
     )
-    if not (found.placards or found.identifiers or found.panels or found.photos):
+    if not any(vars(found).values()):
         raise ConfigError(
-            f"{folder}: has no placards.csv, identifiers.csv, damage.csv or look/ with pictures; "
-            "see docs/benchmarks.md for the layout"
+            f"{folder}: has no placards.csv, identifiers.csv, damage.csv, containers.json or look/ "
+            "with pictures; see docs/benchmarks.md for the layout"
         )
     return found
 
@@ -155,6 +175,63 @@ def _photos(folder: Path) -> Iterator[Pixels]:
     for path in sorted(folder.glob("*")):
         if path.suffix.lower() in _PICTURES:
             yield read_picture(path)
+
+
+class _CocoImage(BaseModel):
+    id: int
+    file_name: str
+
+
+class _CocoBox(BaseModel):
+    image_id: int
+    category_id: int
+    bbox: tuple[float, float, float, float]
+    iscrowd: int = 0
+
+
+class _CocoCategory(BaseModel):
+    id: int
+    name: str
+
+
+class _Coco(BaseModel):
+    images: list[_CocoImage]
+    annotations: list[_CocoBox]
+    categories: list[_CocoCategory]
+
+
+def _boxed(folder: Path) -> Iterator[BoxedImage]:
+    """Yield the images of containers.json with their annotations of the category container."""
+    path = folder / "containers.json"
+    if not path.exists():
+        return
+    try:
+        coco = _Coco.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(key) for key in first["loc"])
+        raise ConfigError(f"{path}{place and ': '}{place}: {first['msg']}") from None
+    chosen = [each.id for each in coco.categories if each.name == "container"]
+    if not chosen:
+        raise ConfigError(f"{path}: categories: has no category named 'container'; rename yours")
+    for image in coco.images:
+        pixels = _picture(folder, image.file_name, f"{path}, image {image.id}")
+        height, width = pixels.shape[:2]
+        own = [
+            each
+            for each in coco.annotations
+            if each.image_id == image.id and each.category_id in chosen
+        ]
+        boxes = np.array([each.bbox for each in own], float).reshape(-1, 4)
+        boxes[:, 2:] += boxes[:, :2]
+        boxes = boxes.clip(0, [width, height, width, height])
+        empty = np.flatnonzero((boxes[:, 2:] <= boxes[:, :2]).any(axis=1))
+        if len(empty):
+            raise ConfigError(
+                f"{path}, image {image.id}: bbox {list(own[empty[0]].bbox)} has no area inside "
+                f"{image.file_name} of {width}x{height} pixels; give x, y, width and height"
+            )
+        yield BoxedImage(pixels, boxes, np.array([each.iscrowd > 0 for each in own], bool))
 
 
 def _picture(folder: Path, name: str, place: str) -> Pixels:

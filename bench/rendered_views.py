@@ -41,7 +41,7 @@ class View(NamedTuple):
 def default_views(preset: str, seed: int, scenes: range, workers: int) -> list[View]:
     """Render one image of each scene, by the cameras of a preset in turn."""
     task = partial(_views_of, preset, seed)
-    return [v for part in in_processes(task, _shares(scenes, workers), workers) for v in part]
+    return [v for part in in_processes(task, shares(scenes, workers), workers) for v in part]
 
 
 def default_texts(seed: int, scenes: range, workers: int) -> list[Text]:
@@ -50,10 +50,11 @@ def default_texts(seed: int, scenes: range, workers: int) -> list[Text]:
     The preset's cameras are zoomed to the identifiers, so that capitals are TEXT_CAP_PX high.
     """
     task = partial(_texts_of, seed)
-    return [t for part in in_processes(task, _shares(scenes, workers), workers) for t in part]
+    return [t for part in in_processes(task, shares(scenes, workers), workers) for t in part]
 
 
-def _shares(scenes: range, workers: int) -> list[range]:
+def shares(scenes: range, workers: int) -> list[range]:
+    """Divide scenes into two parts per process."""
     return [each for i in range(2 * workers) if len(each := scenes[i :: 2 * workers])]
 
 

@@ -53,6 +53,7 @@ def labels(*things, masks=None):
     boxes = torch.tensor([t[1:] for t in things], dtype=torch.float32).reshape(-1, 4)
     target = {"boxes": boxes, "labels": torch.tensor([t[0] for t in things], dtype=torch.int64)}
     target["area"] = (boxes[:, 2:] - boxes[:, :2]).prod(1)
+    target["iscrowd"] = torch.zeros_like(target["labels"])
     if masks is not None:
         target |= {"masks": torch.stack(masks), "area": torch.stack(masks).sum((1, 2)).float()}
     return target

@@ -1,7 +1,8 @@
 """COCO metrics by size and class, precision and recall at one score, and confusion of classes.
 
-Targets are in the loader's detection form, detections in the form of `Detector.predict`. All shares
-are in percent, and nan if there is nothing to measure.
+Targets are in the loader's detection form, detections in the form of `Detector.predict`. Labels
+with `iscrowd` are regions to ignore, as in COCO: they need not be found, and detections inside them
+do not count. All shares are in percent, and nan if there is nothing to measure.
 """
 
 import contextlib
@@ -114,6 +115,35 @@ def score(
         size: (width, height) of the images.
         masks: Compare masks instead of boxes.
     """
+    measured = matched(targets, found, names, size, masks)
+    with contextlib.redirect_stdout(io.StringIO()):
+        measured.accumulate()
+        measured.summarize()
+    precision = measured.eval["precision"][..., 0, -1]  # [IoU, recall, class]
+    return Scores(
+        names=names,
+        summary={name: _percent(float(measured.stats[i])) for name, i in _SUMMARY.items()},
+        class_ap50=[_percent(float(p.mean())) for p in precision[0].T],
+        class_ap=[_percent(float(precision[..., k].mean())) for k in range(len(names))],
+        counts=[
+            sum(int(((t["labels"] == k + 1) & (t["iscrowd"] == 0)).sum()) for t in targets)
+            for k in range(len(names))
+        ],
+        scored=[_scored(measured, k, len(targets)) for k in range(len(names))],
+    )
+
+
+def matched(
+    targets: Sequence[Mapping[str, Any]],
+    found: Sequence[Found],
+    names: Sequence[str],
+    size: tuple[int, int],
+    masks: bool = False,
+) -> COCOeval:
+    """Return pycocotools' evaluation in which detections and labels are matched, not yet summed.
+
+    The arguments are those of `score`.
+    """
     truth = COCO()
     truth.dataset = {
         "info": {},
@@ -122,9 +152,11 @@ def score(
         ],
         "categories": [{"id": k + 1, "name": name} for k, name in enumerate(names)],
         "annotations": [
-            {**one, "area": float(area), "iscrowd": 0}
+            {**one, "area": float(area), "iscrowd": int(crowd)}
             for i, target in enumerate(targets, start=1)
-            for one, area in zip(_entries(target, i, masks), target["area"], strict=True)
+            for one, area, crowd in zip(
+                _entries(target, i, masks), target["area"], target["iscrowd"], strict=True
+            )
         ],
     }
     for number, one in enumerate(truth.dataset["annotations"], start=1):
@@ -139,20 +171,7 @@ def score(
         guessed = truth.loadRes(detections) if detections else _nothing(truth)
         measured = COCOeval(truth, guessed, "segm" if masks else "bbox")
         measured.evaluate()
-        measured.accumulate()
-        measured.summarize()
-    precision = measured.eval["precision"][..., 0, -1]  # [IoU, recall, class]
-    return Scores(
-        names=names,
-        summary={name: _percent(float(measured.stats[i])) for name, i in _SUMMARY.items()},
-        class_ap50=[_percent(float(p.mean())) for p in precision[0].T],
-        class_ap=[_percent(float(precision[..., k].mean())) for k in range(len(names))],
-        counts=[
-            sum(int((target["labels"] == k + 1).sum()) for target in targets)
-            for k in range(len(names))
-        ],
-        scored=[_scored(measured, k, len(targets)) for k in range(len(names))],
-    )
+    return measured
 
 
 def operating_point(scores: Scores) -> OperatingPoint:
@@ -266,9 +285,11 @@ def _scored(
     seen = [entry for entry in entries if entry is not None]
     if not seen:
         return np.zeros(0), np.zeros(0, bool), 0
+    counted = np.concatenate([np.asarray(entry["dtIgnore"])[0] == 0 for entry in seen])
     values = np.concatenate([np.asarray(entry["dtScores"], float) for entry in seen])
     hit = np.concatenate([np.asarray(entry["dtMatches"])[0] > 0 for entry in seen])
-    return values, hit, sum(len(entry["gtIgnore"]) for entry in seen)
+    labels = sum(int(np.count_nonzero(np.asarray(entry["gtIgnore"]) == 0)) for entry in seen)
+    return values[counted], hit[counted], labels
 
 
 def _curve(

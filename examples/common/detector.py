@@ -100,20 +100,24 @@ class Detector(Learner):
 
         Args:
             images: uint8 [3, H, W] each.
-            targets: Labels in the loader's detection form.
+            targets: Labels in the loader's detection form. Boxes with `iscrowd` are regions to
+                ignore: heat inside them is not punished.
         """
         maps = self(self._pixels(images))
         heat, box = maps[0], maps[1]
         total: torch.Tensor = heat.new_zeros(())
-        count = max(sum(len(t["labels"]) for t in targets), 1)
+        count = max(sum(int((t["iscrowd"] == 0).sum()) for t in targets), 1)
         for number, target in enumerate(targets):
-            boxes = target["boxes"].to(heat.device)
-            classes = target["labels"].to(heat.device) - 1
+            crowd = target["iscrowd"] > 0
+            boxes = target["boxes"][~crowd].to(heat.device)
+            classes = target["labels"][~crowd].to(heat.device) - 1
+            ignored = target["boxes"][crowd].to(heat.device)
             bells = gaussians(boxes, heat.shape[2:])
             wanted = torch.zeros_like(heat[number])
             for k in range(len(boxes)):
                 wanted[classes[k]] = torch.maximum(wanted[classes[k]], bells[k])
-            total = total + _focal(heat[number], wanted) / count
+            free = ~_covered(ignored, heat.shape[2:])
+            total = total + _focal(heat[number], wanted, free) / count
             for group, chosen in enumerate((classes == 0, classes > 0)):
                 if chosen.any():
                     lost = _box_loss(box[number, group], boxes[chosen], bells[chosen])
@@ -218,11 +222,24 @@ def _group_masks(target: dict[str, Any]) -> torch.Tensor:
     return masks
 
 
-def _focal(logits: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
-    """Return CenterNet's focal loss, summed over the maps, with lower penalties near a centre."""
+def _covered(boxes: torch.Tensor, shape: torch.Size) -> torch.Tensor:
+    """Return the cells whose centre is in one of the boxes [N, 4] in pixels, bool [h, w]."""
+    x0, y0, x1, y1 = (boxes / STRIDE).T[:, :, None]
+    x = torch.arange(shape[1], device=boxes.device) + 0.5
+    y = torch.arange(shape[0], device=boxes.device) + 0.5
+    across, down = (x >= x0) & (x < x1), (y >= y0) & (y < y1)
+    covered: torch.Tensor = (down[:, :, None] & across[:, None, :]).any(0)
+    return covered
+
+
+def _focal(logits: torch.Tensor, wanted: torch.Tensor, free: torch.Tensor) -> torch.Tensor:
+    """Return CenterNet's focal loss, summed over the maps, with lower penalties near a centre.
+
+    Cells outside `free` [h, w] are not penalized unless they are centres.
+    """
     heat = logits.sigmoid()
     at_centre = (1 - heat) ** 2 * functional.logsigmoid(logits)
-    elsewhere = (1 - wanted) ** 4 * heat**2 * functional.logsigmoid(-logits)
+    elsewhere = free * (1 - wanted) ** 4 * heat**2 * functional.logsigmoid(-logits)
     return -torch.where(wanted == 1, at_centre, elsewhere).sum()
 
 
