@@ -9,15 +9,20 @@ import pytest
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.classes import DAMAGE_VALUES
+from fastgen.geometry.shape_library import ShapeLibrary
 from fastgen.light.environment import (
+    Ambient,
     load_environment,
+    lower_irradiance,
+    prefilter_environment,
     sky_irradiance,
     to_map_frame,
 )
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.octahedral import octahedral_encode
-from fastgen.light.sky_visibility import sky_directions
-from fastgen.light.surrounding_light import Paving, _lattice, surrounding_light
+from fastgen.light.sky_visibility import open_sky, sky_directions
+from fastgen.light.surrounding_change import lattice
+from fastgen.light.surrounding_light import Paving, surrounding_light
 from fastgen.scene import Camera, EnvironmentView, Neighbour, Pose, Spreader
 from fastgen.scene.boxes import back_to_front, container_box, overlap
 from tests import oracle, oracle_scene
@@ -250,7 +255,7 @@ def test_light_between_boxes_equals_a_monte_carlo_integral():
     low, high = boxes[0].corners_mm.min(axis=0), boxes[0].corners_mm.max(axis=0)
     black = 3 * [(0.0, 0.0, 0.0)]
     (found, *_) = surrounding_light(boxes, black, 3 * [(low, high)], light, 40.0, None)
-    points, normals = _lattice(boxes[0].half_mm)
+    points, normals = lattice(boxes[0].half_mm)
     rng = np.random.default_rng(1)
     for number in rng.choice(len(points), 25, replace=False):
         # directions with a density proportional to the cosine
@@ -258,7 +263,7 @@ def test_light_between_boxes_equals_a_monte_carlo_integral():
         toward = normals[number] + around / np.linalg.norm(around, axis=1, keepdims=True)
         start = points[number] + boxes[0].center_mm
         met = [np.isfinite(entered(start, toward, box)) for box in boxes[1:]]
-        np.testing.assert_allclose(found.factor[number], 1 - np.any(met, axis=0).mean(), atol=0.06)
+        np.testing.assert_allclose(found.sky[number], 1 - np.any(met, axis=0).mean(), atol=0.06)
         met = [np.isfinite(entered(start, sky_directions(), box)) for box in boxes[1:]]
         bits = np.unpackbits(found.open_bits[number]).astype(bool)
         np.testing.assert_array_equal(bits, ~np.any(met, axis=0))
@@ -284,7 +289,7 @@ def test_light_off_the_ground_equals_a_monte_carlo_integral(gap_mm):
     (found, *_) = surrounding_light(
         boxes, black, len(boxes) * [(low, high)], light, yaw_deg, paving
     )
-    points, normals = _lattice(boxes[0].half_mm)
+    points, normals = lattice(boxes[0].half_mm)
     points = points + boxes[0].center_mm
     walls = np.flatnonzero((normals[:, 2] == 0) & (points[:, 2] > 20))
     sun = to_map_frame(light.lights[0].direction, -yaw_deg)
@@ -304,13 +309,64 @@ def test_light_off_the_ground_equals_a_monte_carlo_integral(gap_mm):
         shade = np.any([each_enters(at, np.tile(sun, (len(at), 1)), box) for box in boxes], axis=0)
         lit = radiance_toward(light, up, yaw_deg) * ~shut[:, None]
         lit += np.array(light.lights[0].light) * sun[2] * ~shade[:, None]
-        whole = sky_irradiance(light, normals[number : number + 1], yaw_deg)[0]
+        each = normals[number : number + 1]
+        whole = sky_irradiance(light, each, yaw_deg)[0]
+        upper = whole - lower_irradiance(light, each, yaw_deg)[0]
         open_ = np.isinf(met) & (toward[:, 2] >= 0)
         above = (radiance_toward(light, toward, yaw_deg) * open_[:, None]).mean(axis=0)
         expected = (above + albedo * lit.sum(axis=0) / len(around)) / whole
-        apart.append(found.factor[number] - expected)
+        apart.append((found.sky[number] * upper + found.added[number]) / whole - expected)
     assert np.abs(apart).mean() < 0.05
     assert np.abs(apart).max() < 0.2
+
+
+def test_light_of_ground_and_sky_on_turned_facets_equals_a_monte_carlo_integral():
+    """Facets of a shaded wall face different parts of the sky, and about the same ground."""
+    light, yaw_deg = load_environment(bundled_hdris()["sky"]), 230.0
+    mesh, box, albedo = ShapeLibrary().container("20"), container_box("20", Pose()), 0.3
+    (found,) = surrounding_light(
+        [box], [(0.0, 0.0, 0.0)], [mesh.bounds_mm], light, yaw_deg, Paving(0.0, 3 * (albedo,))
+    )
+    rng = np.random.default_rng(2)
+    around = rng.normal(size=(4000, 3))
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    whole = sky_irradiance(light, mesh.normals, yaw_deg)
+    lit = found.vertex_light(open_sky(mesh.normals), whole, mesh)
+    sun = to_map_frame(light.lights[0].direction, -yaw_deg)
+    up = np.array([0.0, 0.0, 1.0])
+    middle = np.abs(mesh.positions_mm[:, 0]) < 2000
+    apart = []
+    for side in (-1.0, 1.0):
+        outward = np.array([0.0, side, 0.0])
+        turned = (np.abs(mesh.normals[:, 0]) > 0.3) & (mesh.normals @ outward > 0.7)
+        for vertex in rng.choice(np.flatnonzero(turned & middle), 12):
+            normal, place = mesh.normals[vertex], mesh.positions_mm[vertex].astype(float)
+            toward = normal + around
+            sky = radiance_toward(light, toward, yaw_deg) * (toward[:, 2:] > 0)
+            down = toward[(toward @ outward > 0) & (toward[:, 2] < 0)]
+            at = place * (1, 1, 0) + down * (-place[2] / down[:, 2:]) * (1, 1, 0)
+            rays = up + around[rng.integers(len(around), size=len(at))]
+            ground = radiance_toward(light, rays, yaw_deg) * ~each_enters(at, rays, box)[:, None]
+            shade = each_enters(at, np.tile(sun, (len(at), 1)), box)
+            ground += np.array(light.lights[0].light) * sun[2] * ~shade[:, None]
+            # half of the hemisphere about a level normal is below the horizon
+            expected = sky.mean(axis=0) + albedo * ground.mean(axis=0) / 2
+            apart.append(lit[vertex] / expected - 1)
+    assert np.abs(apart).mean() < 0.06
+    assert np.abs(apart).max() < 0.15
+
+
+def test_light_between_white_boxes_in_an_even_sky_is_as_bright_as_the_sky():
+    """A white furnace: only the third bounce, of light that is hidden three times, is missing."""
+    even = Ambient.of(prefilter_environment("even", np.ones((64, 128, 3), np.float32)))
+    boxes = [container_box("20", Pose((0.0, y, 0.0))) for y in (0.0, 3400.0)]
+    low, high = boxes[0].corners_mm.min(axis=0), boxes[0].corners_mm.max(axis=0)
+    white = 2 * [(1.0, 1.0, 1.0)]
+    (found, _) = surrounding_light(boxes, white, 2 * [(low, high)], even, 0.0, None)
+    hidden = 1 - found.sky.min()
+    assert hidden > 0.4
+    assert (found.sky + found.added).min() > 1 - 1.1 * hidden**3
+    assert (found.sky + found.added).max() < 1.01
 
 
 def each_enters(points, rays, box):

@@ -126,6 +126,17 @@ def _encoded_part(n: NDArray[np.float32], visible: Directions) -> Array:
     return encoded
 
 
+def visible_share(values: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return the visible share [V] of the cosine-weighted hemisphere of vertices.
+
+    Args:
+        values: uint8 [V, 3 or more], which begin with the cones of `encoded_cones`.
+    """
+    x, y, z = np.subtract(values[:, :3].T, 128, dtype=np.float32)
+    rim = np.clip(2 - 2 / 127 * np.sqrt(x * x + y * y + z * z), 0, 1)
+    return np.asarray(1 - rim * rim, np.float32)
+
+
 @dataclass(frozen=True)
 class Sky:
     """Light of an environment, turned by yaw_deg."""

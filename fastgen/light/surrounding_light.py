@@ -1,20 +1,19 @@
 """Change of the light on a container by its surroundings: other containers and the ground.
 
 The light of a container in the open is known at its vertices (sky_visibility.py). Boxes around it
-and the ground change it smoothly, so factors on that light are computed at few points of its outer
-box, and interpolated. Containers count as boxes with one radiance per face. Form factors are exact
-for faces before the receiving plane; see ground_light.form_factors.
+and the ground change it smoothly, so the change is computed at few points of its outer box, and
+interpolated: the share of the sky's light that is left, and the light that is added. A facet of
+corrugation and the wall around it see different parts of the sky, but nearly the same ground.
+Containers count as boxes with one radiance per face. Form factors are exact for faces before the
+receiving plane; see ground_light.form_factors.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.geometry.mesh import Mesh
 from fastgen.light.environment import (
     Ambient,
     hidden_sky,
@@ -24,21 +23,16 @@ from fastgen.light.environment import (
 )
 from fastgen.light.ground_light import form_factors, left_of_sky
 from fastgen.light.sky_visibility import Sky, sky_directions
+from fastgen.light.surrounding_change import FACES, LIFT_MM, SurroundingLight, lattice, side_of
 from fastgen.scene.boxes import OrientedBox
 
-_STEP_MM = 1000.0
-"""Largest distance between points on a face of the outer box."""
-
-_LIFT_MM = 5.0
 _MOST_HIDDEN = 0.97
+_DARK = 1e-9
 _GROUND_POINTS = 4
 """Points in front of a wall at which the light on the ground is computed."""
 
 _RAYS_PER_POINT = 4
 """Rays that find how much of the ground around such a point the wall sees."""
-
-_FACES = [(axis, sign) for axis in range(3) for sign in (-1, 1)]
-"""Axis and direction of the faces of a box, in the order of all arrays here."""
 
 Array = NDArray[np.float64]
 
@@ -48,97 +42,6 @@ class Paving(NamedTuple):
 
     height_mm: float
     albedo: tuple[float, float, float]
-
-
-@dataclass(frozen=True, eq=False)
-class SurroundingLight:
-    """Change of the light on one container.
-
-    Attributes:
-        factor: float32 [P, 3], factor on the light without directional lights at each point.
-        open_bits: uint8 [P, DIRECTIONS / 8], directions of the container's frame that no other
-            container hides, packed by np.packbits.
-        ground: float32 [6, 3], mean radiance of the ground in a level mirror on the -x, +x, -y, +y,
-            -z and +z side of the container; None without ground.
-    """
-
-    factor: NDArray[np.float32]
-    open_bits: NDArray[np.uint8]
-    ground: NDArray[np.float32] | None
-
-    def applied(self, values: NDArray[np.uint8], mesh: Mesh) -> NDArray[np.uint8]:
-        """Return vertex bytes in these surroundings.
-
-        Args:
-            values: Vertex bytes [V, VERTEX_BYTES] of the container in the open, see
-                SkyVisibility.vertex_bytes.
-            mesh: Its mesh.
-        """
-        corner, weight = _lattice_places(mesh)
-        found = values.copy()
-        found[:, 4:7] = np.minimum(values[:, 4:7] * self.vertex_factors(mesh) + 0.5, 255)
-        nearest = np.take_along_axis(corner, weight.argmax(axis=0)[None], axis=0)[0]
-        found[:, 8:] &= self.open_bits.take(nearest, axis=0)
-        return found
-
-    def vertex_factors(self, mesh: Mesh) -> NDArray[np.float32]:
-        """Return the factor float32 [V, 3] on the light at each vertex of the container's mesh."""
-        corner, weight = _lattice_places(mesh)
-        factor = np.zeros((len(mesh.positions_mm), 3), np.float32)
-        for points, share in zip(corner, weight, strict=True):
-            factor += share[:, None] * self.factor.take(points, axis=0)
-        return factor
-
-
-def _counts(size_mm: Array) -> list[tuple[int, int]]:
-    """Return the points along the two other axes of each face of a box [3]."""
-    along = (np.ceil(size_mm / _STEP_MM).astype(int) + 1).tolist()
-    others = [[k for k in range(3) if k != axis] for axis, _ in _FACES]
-    return [(along[a], along[b]) for a, b in others]
-
-
-def _lattice(half_mm: Array) -> tuple[Array, Array]:
-    """Return the points [P, 3] on a box around the origin, and the normals [P, 3]."""
-    points, normals = [], []
-    for (axis, sign), counts in zip(_FACES, _counts(2 * half_mm), strict=True):
-        a, b = (k for k in range(3) if k != axis)
-        u, v = (
-            np.linspace(-0.98, 0.98, count) * half_mm[k]
-            for count, k in zip(counts, (a, b), strict=True)
-        )
-        face = np.zeros((counts[0] * counts[1], 3))
-        face[:, a], face[:, b] = (each.ravel() for each in np.meshgrid(u, v, indexing="ij"))
-        face[:, axis] = sign * (half_mm[axis] + _LIFT_MM)
-        normal = np.zeros(3)
-        normal[axis] = sign
-        points.append(face)
-        normals.append(np.broadcast_to(normal, face.shape))
-    return np.concatenate(points), np.concatenate(normals)
-
-
-@lru_cache(maxsize=32)
-def _lattice_places(mesh: Mesh) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """Return the four points [4, V] around each vertex, and their bilinear weights [4, V]."""
-    low, high = (np.asarray(bound, np.float64) for bound in mesh.bounds_mm)
-    counts = _counts(high - low)
-    first = np.cumsum([0, *(a * b for a, b in counts)])
-    axis = np.abs(mesh.normals).argmax(axis=1)
-    row = np.arange(len(axis))
-    face = 2 * axis + (mesh.normals[row, axis] > 0)
-    corner = np.zeros((4, len(axis)), np.intp)
-    weight = np.zeros((4, len(axis)), np.float32)
-    share = (mesh.positions_mm - low) / (high - low)
-    for number, (a_count, b_count) in enumerate(counts):
-        chosen = np.flatnonzero(face == number)
-        a, b = (k for k in range(3) if k != number // 2)
-        x = share[chosen, a] * (a_count - 1)
-        y = share[chosen, b] * (b_count - 1)
-        i, j = x.astype(int).clip(0, a_count - 2), y.astype(int).clip(0, b_count - 2)
-        dx, dy = (x - i).clip(0, 1), (y - j).clip(0, 1)
-        for k, (p, q) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
-            corner[k, chosen] = first[number] + (i + p) * b_count + j + q
-            weight[k, chosen] = (dx if p else 1 - dx) * (dy if q else 1 - dy)
-    return corner, weight
 
 
 def surrounding_light(
@@ -160,14 +63,11 @@ def surrounding_light(
         paving: The ground, None without one.
     """
     faces = [_Faces.of(box) for box in boxes]
-    radiance = [
-        _face_radiance(i, faces, boxes, light, yaw_deg) * np.array(albedo)
-        for i, albedo in enumerate(albedos)
-    ]
+    radiance = _face_radiance(faces, boxes, np.array(albedos), light, yaw_deg)
     found, sky = [], Sky(light, yaw_deg)
     for i, box in enumerate(boxes):
         low, high = (np.asarray(bound, np.float64) for bound in bounds[i])
-        local, normals = _lattice((high - low) / 2)
+        local, normals = lattice((high - low) / 2)
         middle = (low + high) / 2 - (0, 0, box.half_mm[2])
         points = box.center_mm + (local + middle) @ box.rotation.T
         toward = normals @ box.rotation.T
@@ -178,23 +78,25 @@ def surrounding_light(
             (part.T @ radiance[j] for part, j in zip(covered, others, strict=True)),
             np.zeros((len(points), 3)),
         )
-        whole = np.maximum(sky_irradiance(light, toward, yaw_deg), 1e-9)
+        whole = sky_irradiance(light, toward, yaw_deg)
         seen = None
+        below = np.zeros((6, 3))
         if paving is None:
-            factor = 1 - hidden[:, None] + bounced / whole
+            left, added = np.repeat(1 - hidden[:, None], 3, axis=1), bounced
         else:
             share, ground, mirrored = _from_ground(points, toward, i, boxes, faces, sky, paving)
             lower = (1 - toward[:, 2]) / 2
             # boxes cover what is below the horizon and not ground
             taken = np.maximum(hidden - (lower - share), 0.0)
             open_ = np.clip(1 - taken / np.maximum(1 - lower, 1e-6), 0.0, 1.0)
-            upper = np.maximum(whole - _lower_by_face(light, box, normals, yaw_deg), 0.0)
+            below = _lower_by_face(light, box, yaw_deg)
+            upper = np.maximum(whole - below[side_of(normals)], _DARK)
             behind = _sky_behind(points, covered, [faces[j] for j in others], sky)
             above = left_of_sky(upper, upper - taken[:, None] * behind, open_[:, None])
-            factor = (above + ground + bounced) / whole
+            left, added = above / upper, ground + bounced
             seen = _mean_by_side(mirrored, normals)
         bits = _open_bits(points, box, [boxes[j] for j in others])
-        found.append(SurroundingLight(np.maximum(factor, 0.02).astype(np.float32), bits, seen))
+        found.append(SurroundingLight(_narrow(left), _narrow(added), _narrow(below), bits, seen))
     return found
 
 
@@ -208,7 +110,7 @@ class _Faces(NamedTuple):
     @staticmethod
     def of(box: OrientedBox) -> "_Faces":
         corners, normals = [], []
-        for axis, sign in _FACES:
+        for axis, sign in FACES:
             a, b = (axis + 1) % 3, (axis + 2) % 3
             if sign > 0:
                 a, b = b, a
@@ -249,19 +151,30 @@ def _sky_behind(points: Array, covered: Array, faces: Sequence[_Faces], sky: Sky
 
 
 def _face_radiance(
-    number: int,
     faces: Sequence[_Faces],
     boxes: Sequence[OrientedBox],
+    albedos: Array,
     light: Ambient,
     yaw_deg: float,
 ) -> Array:
-    """Return irradiance / pi [6, 3] in the middle of each face of a box between the others."""
-    own = faces[number]
-    start = own.middles + _LIFT_MM * own.normals
-    others = [each for j, each in enumerate(faces) if j != number]
-    hidden = _covered(start, own.normals, others).sum(axis=(0, 1))
-    found: Array = sky_irradiance(light, own.normals, yaw_deg) * (1 - hidden[:, None])
-    return found + _from_lights(start, own.normals, boxes, light, yaw_deg)
+    """Return the radiance [B, 6, 3] in the middle of each face of boxes with albedos [B, 3].
+
+    It includes one bounce from the other boxes.
+    """
+    count = len(boxes)
+    received, between = np.zeros((count, 6, 3)), np.zeros((count, 6, count, 6))
+    for number, own in enumerate(faces):
+        start = own.middles + LIFT_MM * own.normals
+        others = [j for j in range(count) if j != number]
+        covered = _covered(start, own.normals, [faces[j] for j in others])
+        between[number][:, others] = covered.transpose(2, 0, 1)
+        left = 1 - covered.sum(axis=(0, 1))[:, None]
+        received[number] = sky_irradiance(light, own.normals, yaw_deg) * left
+        received[number] += _from_lights(start, own.normals, boxes, light, yaw_deg)
+    paint = albedos[:, None]
+    bounced = np.tensordot(between, received * paint, axes=2)
+    found: Array = (received + bounced) * paint
+    return found
 
 
 def _from_lights(
@@ -277,11 +190,10 @@ def _from_lights(
     return found
 
 
-def _lower_by_face(light: Ambient, box: OrientedBox, normals: Array, yaw_deg: float) -> Array:
-    """Return the irradiance / pi [P, 3] from below the horizon, for normals [P, 3] of a box."""
-    of_axes = np.concatenate([-np.eye(3), np.eye(3)])
-    found = lower_irradiance(light, of_axes @ box.rotation.T, yaw_deg)
-    return np.asarray(found[(of_axes @ normals.T).argmax(axis=0)], np.float64)
+def _lower_by_face(light: Ambient, box: OrientedBox, yaw_deg: float) -> Array:
+    """Return the irradiance / pi [6, 3] from below the horizon on each side of a box."""
+    normals = np.array([sign * box.axes[axis] for axis, sign in FACES])
+    return np.asarray(lower_irradiance(light, normals, yaw_deg), np.float64)
 
 
 def _from_ground(
@@ -310,7 +222,7 @@ def _from_ground(
     away = height * np.sqrt((1 - quantile) ** -2 - 1)
     level = toward * (1, 1, 0)
     ends = points + away[..., None] * level
-    ends[..., 2] = paving.height_mm + _LIFT_MM
+    ends[..., 2] = paving.height_mm + LIFT_MM
     seen = np.broadcast_to(lower > 0, away.shape)
     for other, box in enumerate(boxes):
         if other != number:
@@ -319,7 +231,7 @@ def _from_ground(
     group, some = np.nonzero(parts)
     middle = (away * seen).sum(axis=1)[group, some] / seen.sum(axis=1)[group, some]
     at = points[some] + middle[:, None] * level[some]
-    at[:, 2] = paving.height_mm + _LIFT_MM
+    at[:, 2] = paving.height_mm + LIFT_MM
     normals = np.broadcast_to(up, at.shape)
     covered = _covered(at, normals, faces)
     hidden = covered.sum(axis=(0, 1))[:, None]
@@ -335,6 +247,10 @@ def _from_ground(
     return share, found * np.array(paving.albedo), mirrored
 
 
+def _narrow(values: Array) -> NDArray[np.float32]:
+    return np.asarray(values, np.float32)
+
+
 def _sums(values: Array, at: NDArray[np.intp], count: int) -> Array:
     """Return the sums [count, C] of the values [K, C] of each of `count` places, given by `at`."""
     return np.stack([np.bincount(at, channel, count) for channel in values.T], axis=1)
@@ -342,7 +258,7 @@ def _sums(values: Array, at: NDArray[np.intp], count: int) -> Array:
 
 def _mean_by_side(weighted: Array, normals: Array) -> NDArray[np.float32]:
     """Return the mean radiance [6, 3] on each side of sums and weights [P, 4]."""
-    sides = np.stack([normals[:, axis] * sign > 0.5 for axis, sign in _FACES]).astype(float)
+    sides = np.stack([normals[:, axis] * sign > 0.5 for axis, sign in FACES]).astype(float)
     found = sides @ weighted
     return np.asarray(found[:, :3] / np.maximum(found[:, 3:], 1e-6), np.float32)
 

@@ -12,7 +12,7 @@ from fastgen.geometry.unit_solids import unit_solid
 from fastgen.light.environment import Ambient, sky_irradiance, to_map_frame
 from fastgen.light.ground_light import GroundLight, mean_albedo
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
-from fastgen.light.surrounding_light import SurroundingLight
+from fastgen.light.surrounding_change import SurroundingLight
 from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.scene import Ground, Prop, Scene
 from fastgen.scene.boxes import rotation_of
@@ -87,7 +87,8 @@ def _of_member(one: LitMember, lens: bool) -> list[LitBody]:
         light = lit.without_lights
         if number == 0:
             place = deform(damages, place) if damages else place
-            light = light if one.around is None else light * one.around.vertex_factors(mesh)
+            if one.around is not None:
+                light = one.around.vertex_light(lit.values, light, mesh)
         bodies.append(
             LitBody(
                 (place @ turn.T + origin).astype(np.float32),

@@ -11,7 +11,8 @@ from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.exposure import metered_exposure
 from fastgen.light.ground_light import mean_albedo
 from fastgen.light.lamps import unit_luminance, with_lamps
-from fastgen.light.surrounding_light import Paving, SurroundingLight, surrounding_light
+from fastgen.light.surrounding_change import SurroundingLight
+from fastgen.light.surrounding_light import Paving, surrounding_light
 from fastgen.render.environment_textures import BackgroundTextures, GpuLight
 from fastgen.render.gl import GLContext
 from fastgen.render.recent_cache import RecentCache, ReleasingCache

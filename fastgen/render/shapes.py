@@ -11,7 +11,7 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.seals import nearest_gear, seal_charts
 from fastgen.light.environment import Ambient
 from fastgen.light.sky_visibility import Sky
-from fastgen.light.surrounding_light import SurroundingLight
+from fastgen.light.surrounding_change import SurroundingLight
 from fastgen.render.gpu_mesh import GpuMesh, zone_rows, zone_table
 from fastgen.render.recent_cache import RecentCache, ReleasingCache
 from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
@@ -69,7 +69,8 @@ class Shapes:
         values = below.values
         if surroundings is not None:
             values = self._surrounded.get(
-                (below, surroundings), lambda: surroundings.applied(below.values, mesh.mesh)
+                (below, surroundings),
+                lambda: surroundings.applied(below.values, below.without_lights, mesh.mesh),
             )
         mesh.set_sky_visibility(values)
         if shape is None:
