@@ -271,12 +271,17 @@ def test_outer_and_inner_view_may_share_two_texture_rows(generator, monkeypatch)
         def __getattr__(self, name):
             return getattr(self._ctx, name)
 
-    def made(gl, *rest):
-        return VisibilityBuffer(SimpleNamespace(ctx=Shorter(gl.ctx), function=gl.function), *rest)
+    shortened = []
 
-    monkeypatch.setattr("fastgen.render.image_targets.VisibilityBuffer", made)
+    def made(gl, *rest):
+        short_gl = SimpleNamespace(ctx=Shorter(gl.ctx), function=gl.function)
+        shortened.append(VisibilityBuffer(short_gl, *rest))
+        return shortened[-1]
+
+    monkeypatch.setattr("fastgen.render.recent_targets.VisibilityBuffer", made)
     with Generator(DAMAGED, seed=21, size=SIZE) as other:
         short = other.render(scene=scene, camera="close")
+    assert shortened[0].inner_row == 2 * SIZE[1] - 1
     assert (usual.depth > 3.5).sum() > 50
     for name in ("image", "ids", "damage"):
         np.testing.assert_array_equal(getattr(short, name), getattr(usual, name))
