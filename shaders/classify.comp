@@ -8,7 +8,6 @@
 #include "samples.constants"
 #include "variant.constants"
 #include "scene.block"
-#include "view.block"
 #include "damage.block"
 #include "surface_id.glsl"
 #include "zone_id.glsl"
@@ -79,7 +78,7 @@ void main() {
     ivec2 in_region = 2 * in_turn((region.zw + 1) / 2);
     if (in_region.y >= region.w) return;
     ivec2 block = region.xy + in_region;
-    vec3 middle = vec3(vec2(block + 1) / vec2(textureSize(surface_ids, 0).xy), samples_layer);
+    vec2 middle = vec2(block + 1) / vec2(textureSize(surface_ids, 0));
     // The swizzle .wzxy reorders the texels of textureGather as in_block counts them.
     uvec4 key = textureGather(surface_ids, middle).wzxy;
     vec4 atlas_x = textureGather(atlas_positions, middle, 0).wzxy;
@@ -135,8 +134,9 @@ void main() {
     ivec2 part_at[3] = ivec2[3](middle, first_at, last_at);
     bool decal = false;
     for (int i = 0; i < 3; ++i)
-        decal = decal || (part[i] != 0u && near_decals(id_zone(part[i]), atlas_at(part_at[i])));
-    if (key != 0u) write_labels(pixel, key, depth_at(middle));
+        decal = decal || (part[i] != 0u && near_decals(id_zone(part[i]),
+                                                       texelFetch(atlas_positions, part_at[i], 0).xy));
+    if (key != 0u) write_labels(pixel, key, texelFetch(surface_depths, middle, 0).r);
     uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
     if (mixed) list = decal ? LIST_MIXED_DECAL : LIST_MIXED;
 #if DAMAGED

@@ -2,7 +2,7 @@
 // without shadow. The lights are extracted from the HDRI: the sun or lamps; light 0 is the brightest.
 
 #include "reflectance.constants"
-#include "lights.block"
+#include "view.block"
 #include "brdf.glsl"
 #include "reflectance.glsl"
 

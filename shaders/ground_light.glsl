@@ -8,7 +8,7 @@
 #include "ground.constants"
 #include "ground.block"
 #include "variant.constants"
-#include "lights.block"
+#include "view.block"
 #include "ground_bodies.glsl"
 
 uniform sampler2D ground_grid;

@@ -6,7 +6,6 @@
 #include "ground.constants"
 #include "ground.block"
 #include "view.block"
-#include "lights.block"
 #include "environment_map.glsl"
 #include "ground_bodies.glsl"
 #include "ground_light.glsl"

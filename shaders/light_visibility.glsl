@@ -5,7 +5,7 @@
 
 #include "shadow.constants"
 #include "variant.constants"
-#include "lights.block"
+#include "view.block"
 #include "shadow_map.glsl"
 
 // Percentage-closer filtering (Reeves et al. 1987, Rendering Antialiased Shadows with Depth Maps) over

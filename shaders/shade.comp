@@ -72,7 +72,7 @@ void main() {
             for (int i = FILTER_SAMPLES - 1; i >= 0; --i)
                 if ((others & 1u << i) != 0u) at = FILTER_OFFSET[i];
             others &= others - 1u;   // Clears the lowest bit.
-            add_material(mean, p, zone, atlas_at(middle + at), float(lookups));
+            add_material(mean, p, zone, texelFetch(atlas_positions, middle + at, 0).xy, float(lookups));
         } while (++lookup < lookups);
         p.surface = mean;
 #endif

@@ -17,7 +17,7 @@ Shaded shade_hole(ivec2 sample_at, uint key, Shaded behind) {
     ivec2 inner_at = ivec2(textureSize(surface_ids, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
     uint inner_key = surface_id_at(inner_at);
     vec3 rest_mm = rest_at(inner_at);
-    float depth = depth_at(inner_at);
+    float depth = texelFetch(surface_depths, inner_at, 0).r;
     Shaded s = behind;
     if (inner_key != 0u) {
         vec3 normal = -id_normal(inner_key);   // The inner view sees surfaces from behind.

@@ -18,8 +18,9 @@ Shaded shade_single_surface(ivec2 pixel) {
     // position is linear in the pixel.
     const ivec2 one = ivec2(FILTER_STEP), other = ivec2(FILTER_STEP, -FILTER_STEP);
     const mat2 pixels = mat2(from_center(vec2(one)), from_center(vec2(other)));
-    vec2 atlas_mm = atlas_at(middle);
-    mat2 moved_mm = mat2(atlas_at(middle + one) - atlas_mm, atlas_at(middle + other) - atlas_mm);
+    vec2 atlas_mm = texelFetch(atlas_positions, middle, 0).xy;
+    mat2 moved_mm = mat2(texelFetch(atlas_positions, middle + one, 0).xy - atlas_mm,
+                         texelFetch(atlas_positions, middle + other, 0).xy - atlas_mm);
     mat2 mm_of_pixel = moved_mm * inverse(pixels);
     SurfacePoint mean = empty_material_sum(p.surface);
     for (int i = 0; i < LOOKUPS; ++i)

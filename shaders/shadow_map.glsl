@@ -3,7 +3,7 @@
 // MainShadowPosition main_shadow_position(vec3 from_eye): where light 0 looks up a point.
 // float shadow_lookup(vec3 at, vec4 tile): the lookup. from_eye: Vector from the eye to the point in m.
 
-#include "lights.block"
+#include "view.block"
 
 uniform sampler2DShadow shadow_map;   // One tile per light, and light 0's end tile.
 

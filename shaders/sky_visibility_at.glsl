@@ -3,18 +3,16 @@
 
 #include "sky_visibility.constants"
 #include "zones.constants"
-#include "view.block"
 #include "sky_visibility.glsl"
 #include "visibility_buffer.glsl"
 
 // Decodes what fastgen/light/sky_visibility.py encodes. On the spreader the light includes indirect light
 // already; see indirect_light.py.
 SkyVisibility sky_visibility_at(ivec2 sample_at, uint zone) {
-    ivec3 at = ivec3(sample_at, samples_layer);
-    vec4 stored = unpackUnorm4x8(texelFetch(sky_visibility_cones, at, 0).r);
+    vec4 stored = unpackUnorm4x8(texelFetch(sky_visibility_cones, sample_at, 0).r);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
-    vec4 encoded = unpackUnorm4x8(texelFetch(sky_visibility_light, at, 0).r);
+    vec4 encoded = unpackUnorm4x8(texelFetch(sky_visibility_light, sample_at, 0).r);
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float lacks_indirect = zone < SPREADER_ZONE ? 1.0 : 0.0;
     float cone_cosine = clamp(2.0 - 2.0 * size, 0.0, 1.0);

@@ -1,34 +1,26 @@
 // The visibility buffer, which geometry.frag writes: one texel per sample. The shading stages read it.
-// uint surface_id_at(ivec2 sample_at): surface id of one sample in the visibility buffer; 0 is sky.
-// vec2 atlas_at(ivec2 sample_at): atlas position of a sample in mm.
-// float depth_at(ivec2 sample_at): depth of a sample in m.
+// uint surface_id_at(ivec2 middle): surface id of one sample in the visibility buffer; 0 is sky.
 // uint[] near_surface_ids(ivec2 middle): ids of the first FILTER_NEAR samples of the pixel filter.
 // uint[] filter_surface_ids(ivec2 middle): ids of all its samples, in the order of FILTER_OFFSET.
 // middle: Texel of the sample at the pixel's centre.
 
 #include "samples.constants"
-#include "view.block"
 
-// Texture arrays; samples_layer is the layer of the image.
-uniform usampler2DArray surface_ids;            // 0 where no surface is seen.
-uniform sampler2DArray atlas_positions;         // In mm.
-uniform sampler2DArray surface_depths;          // In m.
-uniform usampler2DArray sky_visibility_cones;   // Four bytes per texel.
-uniform usampler2DArray sky_visibility_light;   // Four bytes per texel.
+uniform usampler2D surface_ids;            // 0 where no surface is seen.
+uniform sampler2D atlas_positions;         // In mm.
+uniform sampler2D surface_depths;          // In m.
+uniform usampler2D sky_visibility_cones;   // Four bytes per texel.
+uniform usampler2D sky_visibility_light;   // Four bytes per texel.
 
-uint surface_id_at(ivec2 sample_at) { return texelFetch(surface_ids, ivec3(sample_at, samples_layer), 0).r; }
-
-vec2 atlas_at(ivec2 sample_at) { return texelFetch(atlas_positions, ivec3(sample_at, samples_layer), 0).xy; }
-
-float depth_at(ivec2 sample_at) { return texelFetch(surface_depths, ivec3(sample_at, samples_layer), 0).r; }
+uint surface_id_at(ivec2 middle) { return texelFetch(surface_ids, middle, 0).r; }
 
 #if SAMPLES_PER_AXIS == 2 || SAMPLES_PER_AXIS == 3
 // Near samples are at most a texel from the centre. Two gathers return most ids at half the cost
 // of single fetches.
 uint[FILTER_NEAR] near_surface_ids(ivec2 middle) {
-    vec2 corner = 1.0 / vec2(textureSize(surface_ids, 0).xy);
-    uvec4 low = textureGather(surface_ids, vec3(vec2(middle) * corner, samples_layer));
-    uvec4 high = textureGather(surface_ids, vec3(vec2(middle + 1) * corner, samples_layer));
+    vec2 corner = 1.0 / vec2(textureSize(surface_ids, 0));
+    uvec4 low = textureGather(surface_ids, vec2(middle) * corner);
+    uvec4 high = textureGather(surface_ids, vec2(middle + 1) * corner);
     uint beside[9] = uint[9](
         low.w, low.z, surface_id_at(middle + ivec2(1, -1)),
         low.x, low.y, high.z,

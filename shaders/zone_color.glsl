@@ -34,7 +34,7 @@ vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 view) {
     float overhead = above.a * sky.lacks_indirect * max(p.surface.outward.z, 0.0);
     sky.occluder_albedo = mix(sky.occluder_albedo, above.rgb, overhead);
     vec4 light_seen = vec4(0.0);
-    float depth = depth_at(sample_at);
+    float depth = texelFetch(surface_depths, sample_at, 0).r;
     vec2 position = sample_position(sample_at);
     vec3 from_eye = depth * view_ray(position);
 #if TRACED

@@ -32,11 +32,11 @@ struct ZoneSample {
 };
 
 ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
-    vec2 atlas_mm = atlas_at(sample_at);
+    vec2 atlas_mm = texelFetch(atlas_positions, sample_at, 0).xy;
     vec3 normal = id_normal(key);
     ZoneSample p;
     p.damage = uint(undamaged_value);
-    p.depth = depth_at(sample_at);
+    p.depth = texelFetch(surface_depths, sample_at, 0).r;
     p.scar = NO_SCAR;
 #if WITH_DAMAGE
     DamageSample d = damage_at(rest_at(sample_at));

@@ -71,14 +71,14 @@ def test_a_frame_does_not_depend_on_earlier_frames(monkeypatch, quality):
     begin = VisibilityBuffer.begin
     spoilt = []
 
-    def spoil(targets, layers):
-        targets._make_room(layers)
+    def spoil(targets, damage, *rest):
+        targets._make_room(damage, rest[0])
         origin = origins[len(spoilt) % len(origins)]
         positions = [t for name, t in targets.textures.items() if name.startswith("rest_")]
         for texture, value in zip(positions, origin, strict=False):
             texture.write(np.full(texture.size[::-1], value, np.float32).tobytes())
             spoilt.append(value)
-        begin(targets, layers)
+        begin(targets, damage, *rest)
 
     monkeypatch.setattr(VisibilityBuffer, "begin", spoil)
     for (one, _), (other, _) in zip(first, drawn(KINDS["holed"], quality, scenes), strict=True):

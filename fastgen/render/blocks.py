@@ -1,4 +1,4 @@
-"""Uniform blocks that the shaders read: scene, view, directional lights, damages and ground.
+"""Uniform blocks that the shaders read: of the scene, the view, the damages and the ground.
 
 A shader declares a block with `#include "NAME.block"`.
 """
@@ -62,7 +62,6 @@ VIEW_BLOCK = Block(
         ("vec3", "ray_down"),
         ("vec2", "yaw"),  # cosine and sine of the environment's rotation
         ("int", "point_step"),  # pixels between the points from which rays are cast
-        ("int", "samples_layer"),  # of the visibility buffer
         ("vec4", "lens_radial"),
         ("vec4", "lens_inverse", 2),  # polynomial of the inverse distortion
         ("vec2", "lens_tangential"),
@@ -73,13 +72,6 @@ VIEW_BLOCK = Block(
         ("vec2", "lens_linear_from"),  # radius beyond which the distortion is linear, slope there
         ("vec2", "lens_focal"),
         ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
-    ),
-)
-
-LIGHTS_BLOCK = Block(
-    "LightsBlock",
-    4,
-    (
         ("mat4", "ray_to_shadow", MAX_LIGHTS),  # vector from the eye in m to (u, v, depth)
         ("vec4", "shadow_tile", MAX_LIGHTS),  # (u, v) of the first and the last texel of its tile
         # the first light has a finer tile for the end of the container that it shines on
@@ -149,7 +141,6 @@ GROUND_BLOCK = Block(
 BLOCKS: Mapping[str, Block] = {
     "scene": SCENE_BLOCK,
     "view": VIEW_BLOCK,
-    "lights": LIGHTS_BLOCK,
     "damage": DAMAGE_BLOCK,
     "ground": GROUND_BLOCK,
 }

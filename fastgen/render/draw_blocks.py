@@ -1,4 +1,4 @@
-"""Uniform blocks that all draws share: scene, view, directional lights and damages."""
+"""Uniform blocks that all draws share: those of the scene, the view and the damages."""
 
 from collections.abc import Mapping
 
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.render.blocks import DAMAGE_BLOCK, LIGHTS_BLOCK, SCENE_BLOCK, VIEW_BLOCK
+from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
 from fastgen.render.draw_inputs import DrawInputs
 from fastgen.render.scene_resources import DecalTextures
 from fastgen.render.surface_values import damage_values, scene_values
@@ -17,7 +17,7 @@ from fastgen.scene import Damage, Scene
 
 
 class DrawBlocks:
-    """Buffers of the blocks; each method fills one for the draws that follow.
+    """Buffers of the three blocks; each method fills one for the draws that follow.
 
     All are bound from the start, because some shaders declare blocks that they do not read.
 
@@ -29,7 +29,7 @@ class DrawBlocks:
     def __init__(self, ctx: moderngl.Context, mask_threshold_mm: float) -> None:
         self._mask_threshold_mm = mask_threshold_mm
         self._buffers: dict[str, moderngl.Buffer] = {}
-        for block in (SCENE_BLOCK, VIEW_BLOCK, LIGHTS_BLOCK, DAMAGE_BLOCK):
+        for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):
             self._buffers[block.name] = buffer = ctx.buffer(reserve=block.size)
             buffer.bind_to_uniform_block(block.binding)
 
@@ -63,12 +63,8 @@ class DrawBlocks:
             scene: The scene that it shows.
             exposure: Factor on radiance.
         """
-        values = view_values(scene, inputs.view, inputs.samples, inputs.layer, exposure)
-        self._fill(VIEW_BLOCK, values)
-
-    def lights(self, values: Mapping[str, ArrayLike]) -> None:
-        """Fill the block of the directional lights with what `light_values` returns."""
-        self._fill(LIGHTS_BLOCK, values)
+        values = view_values(scene, inputs.view, inputs.samples, exposure)
+        self._fill(VIEW_BLOCK, {**values, **inputs.lights})
 
     def _fill(self, block: Block, values: Mapping[str, ArrayLike]) -> None:
         buffer = self._buffers[block.name]

@@ -1,11 +1,12 @@
 """DrawInputs: what the passes over one image share."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import moderngl
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import corners_mm
@@ -147,9 +148,9 @@ class DrawInputs:
         regions: Where the passes have work.
         targets: Where the image goes.
         samples: The visibility buffer, with as many samples as the variant says.
-        layer: Layer of the visibility buffer that holds the image.
         coarse_ground: Shade the ground plane at half the resolution.
         variant: What all shaders of the image have in common.
+        lights: Values of the directional lights in the uniform block of the view.
         textures: Textures by sampler name. A pass adds what it writes for later passes.
     """
 
@@ -165,7 +166,7 @@ class DrawInputs:
     coarse_ground: bool
     variant: ShaderVariant
     textures: dict[str, moderngl.Texture | moderngl.TextureArray]
-    layer: int = 0
+    lights: dict[str, ArrayLike] = field(default_factory=dict)
 
     def of_cables(self, samples: VisibilityBuffer) -> "DrawInputs":
         """Return the inputs that draw the regions of the cables with another number of samples."""

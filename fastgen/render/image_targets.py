@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastgen.frame import Frame
 from fastgen.render.gl import GLContext
-from fastgen.render.gl_enums import GL_DEPTH_ATTACHMENT, GL_FRAMEBUFFER, GL_R32UI
+from fastgen.render.gl_enums import GL_DEPTH_ATTACHMENT, GL_FRAMEBUFFER, GL_R32UI, GL_TEXTURE_2D
 from fastgen.render.pixel_lists import PixelLists
 from fastgen.render.textures import FLOATS, NUMBERS, texture_clearing
 from fastgen.render.variant import PIXEL_CLASSES
@@ -41,16 +41,15 @@ class ImageTargets:
         self._normals: moderngl.Texture | None = None
         self.lists = PixelLists(ctx, size, tuple(PIXEL_CLASSES))
         self._attach = gl.function(
-            "glFramebufferTextureLayer", None, *[ctypes.c_uint] * 3, *[ctypes.c_int] * 2
+            "glFramebufferTexture2D", None, *[ctypes.c_uint] * 4, ctypes.c_int
         )
         self._clear = texture_clearing(gl)
 
-    def begin(self, samples: VisibilityBuffer, layer: int, over: bool = False) -> bool:
+    def begin(self, samples: VisibilityBuffer, over: bool = False) -> bool:
         """Clear labels and depth, and bind the colour alone.
 
         Args:
             samples: The visibility buffer of the surfaces.
-            layer: Layer of the visibility buffer that holds the image.
             over: The whole image gets a background, before any surface is drawn.
 
         Returns:
@@ -64,7 +63,7 @@ class ImageTargets:
             return False
         # moderngl requires attachments of one size; the depth of holed scenes has more rows
         tested = samples.depth_buffer.glo
-        self._attach(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, tested, 0, layer)
+        self._attach(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, tested, 0)
         return True
 
     def bind_images(self, over: bool = False) -> None:

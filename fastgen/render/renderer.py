@@ -278,7 +278,7 @@ class Renderer:
     def _light(
         self, inputs: DrawInputs, member: Member, whole: PreparedScene, exposure: float
     ) -> None:
-        """Cast the shadows of the directional lights, and fill the blocks of lights and view.
+        """Cast the shadows of the directional lights, and fill the uniform block of the view.
 
         Args:
             inputs: The image.
@@ -291,7 +291,7 @@ class Renderer:
         shadow = self._lights.shadows.cast(member, whole, lights)
         if shadow is not None:
             inputs.textures["shadow_map"] = shadow.depth
-        self._blocks.lights(light_values(lights, shadow, view.position_m))
+        inputs.lights.update(light_values(lights, shadow, view.position_m))
         self._blocks.view(inputs, scene, exposure)
 
     def _trace(

@@ -362,7 +362,7 @@ def shader_lights(lights: Sequence[DirectionalLight]) -> int:
 def light_values(
     lights: Sequence[DirectionalLight], shadow: ShadowMap | None, eye_m: Array
 ) -> dict[str, ArrayLike]:
-    """Return the members of LIGHTS_BLOCK.
+    """Return the members of VIEW_BLOCK that describe directional lights.
 
     Args:
         lights: The lights of the environment.

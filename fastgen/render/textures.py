@@ -9,7 +9,6 @@ import numpy as np
 from fastgen.render.gl import GLContext
 from fastgen.render.gl_enums import (
     GL_DEPTH_COMPONENT,
-    GL_DEPTH_COMPONENT24,
     GL_FLOAT,
     GL_RED,
     GL_RED_INTEGER,
@@ -60,20 +59,6 @@ def levelled_storage(
     allocate = gl.function("glTexStorage3D", None, _ENUM, _INT, _ENUM, *(_INT,) * 3)
     allocate(GL_TEXTURE_2D_ARRAY, levels, stored, side, side, count)
     return _clamped(texture)
-
-
-def depth_layers(gl: GLContext, size: tuple[int, int, int]) -> moderngl.TextureArray:
-    """Return a depth buffer of several layers, which moderngl does not have.
-
-    Args:
-        gl: Current context.
-        size: Width and height in texels, and number of layers.
-    """
-    texture = gl.ctx.texture_array((1, 1, 1), 1)
-    texture.use()
-    allocate = gl.function("glTexStorage3D", None, _ENUM, _INT, _ENUM, *(_INT,) * 3)
-    allocate(GL_TEXTURE_2D_ARRAY, 1, GL_DEPTH_COMPONENT24, *size)
-    return texture
 
 
 def fill_layers(
@@ -132,38 +117,24 @@ DEPTHS = GL_DEPTH_COMPONENT, GL_FLOAT
 """Pixel format and type of the value that fills a texture."""
 
 
-Clear = Callable[
-    [moderngl.Texture | moderngl.TextureArray, tuple[int, int, int, int], tuple[int, int], float],
-    None,
-]
-"""Fills texels of a texture with one value, see `texture_clearing`."""
-
-
-def texture_clearing(gl: GLContext, layer: int = 0) -> Clear:
-    """Return a function that fills texels of a texture with one value.
-
-    llvmpipe takes four times as long to clear a framebuffer, and longer for a part of one.
-
-    Args:
-        gl: Current context.
-        layer: Layer of texture arrays that the function fills.
-
-    Returns:
-        A function of the texture, a box (x, y, width, height), one of the formats above, and the
-        value.
-    """
+def texture_clearing(
+    gl: GLContext,
+) -> Callable[[moderngl.Texture, tuple[int, int, int, int], tuple[int, int], float], None]:
+    """What fills texels of a texture with one value: takes it, a box (x, y, width, height), one of
+    the formats above and the value. Clearing framebuffers, llvmpipe takes four times as long, and
+    longer for a part."""
     box = (_INT,) * 7  # mip level, x, y, z, width, height, depth
     clear = gl.function("glClearTexSubImage", None, _ENUM, *box, _ENUM, _ENUM, ctypes.c_void_p)
 
     def fill(
-        texture: moderngl.Texture | moderngl.TextureArray,
+        texture: moderngl.Texture,
         box: tuple[int, int, int, int],
         stored_as: tuple[int, int],
         value: float,
     ) -> None:
         x, y, width, height = box
         held = (_ENUM * 1)(int(value)) if stored_as == NUMBERS else (ctypes.c_float * 1)(value)
-        clear(texture.glo, 0, x, y, layer, width, height, 1, *stored_as, held)
+        clear(texture.glo, 0, x, y, 0, width, height, 1, *stored_as, held)
 
     return fill
 

@@ -1,4 +1,4 @@
-"""Values of the uniform block of the view."""
+"""Values of the view's uniform block that describe the camera."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,17 +10,9 @@ from fastgen.scene import Scene
 
 
 def view_values(
-    scene: Scene, view: View, samples: VisibilityBuffer, layer: int, exposure: float
+    scene: Scene, view: View, samples: VisibilityBuffer, exposure: float
 ) -> dict[str, ArrayLike]:
-    """Return the members of VIEW_BLOCK.
-
-    Args:
-        scene: The scene.
-        view: Projection of the image.
-        samples: The visibility buffer.
-        layer: Layer of the visibility buffer that holds the image.
-        exposure: Factor on radiance.
-    """
+    """Return the members of VIEW_BLOCK about the camera."""
     to_samples = np.eye(4)
     to_samples[:2, :2] = samples.to_clip
     right, down, forward = view.rotation
@@ -37,6 +29,5 @@ def view_values(
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
         "point_step": point_step(view.size),
-        "samples_layer": layer,
         **view.lens_values(samples.to_clip),
     }

@@ -2,16 +2,16 @@
 
 import ctypes
 from collections.abc import Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import moderngl
 import numpy as np
 
 from fastgen.render.gl import GLContext
-from fastgen.render.gl_enums import GL_DEPTH_ATTACHMENT, GL_FRAMEBUFFER, GL_SCISSOR_TEST
+from fastgen.render.gl_enums import GL_SCISSOR_TEST
 from fastgen.render.regions import Region
 from fastgen.render.sample_lattice import SampleLattice
-from fastgen.render.textures import DEPTHS, FLOATS, NUMBERS, depth_layers, texture_clearing
+from fastgen.render.textures import DEPTHS, FLOATS, NUMBERS, texture_clearing
 
 T = TypeVar("T")
 
@@ -26,34 +26,13 @@ The buffer with more samples, which `draft` uses for cables and distant containe
 needs the rows near the lower edge of the image."""
 
 
-class LayerUse(NamedTuple):
-    """Parts of a layer of the visibility buffer that an image uses.
-
-    Regions are in pixels of the image; None is the whole image.
-
-    Attributes:
-        damage: One of DAMAGE_VARIANTS.
-        seen: Regions that will be read.
-        rest: Regions where rest positions will be read.
-        holes: Regions that `limit_inside` will name.
-        over: The surfaces are drawn over an image, which has its sky already.
-    """
-
-    damage: str
-    seen: Sequence[Region | None]
-    rest: Sequence[Region | None] = ()
-    holes: Sequence[Region | None] = ()
-    over: bool = False
-
-
 class VisibilityBuffer:
-    """Texture arrays that the geometry pass writes, one texel per sample.
+    """Textures that the geometry pass writes, one texel per sample.
 
     They hold surface id, atlas position, depth, sky visibility and the light of each sample, and
-    for damaged scenes the rest position. An image has one layer. A holed scene has a second,
-    mirrored view below the first one: what holes reveal of the interior. Images of a size share
-    the textures, which grow when images need more, because a driver may keep all of a texture in
-    memory.
+    for damaged scenes the rest position. A holed scene has a second, mirrored view below the first
+    one: what holes reveal of the interior. Images of a size share the textures, which grow when a
+    scene needs more, because a driver may keep all of a texture in memory.
 
     Attributes:
         per_axis: Samples per pixel along each axis.
@@ -69,7 +48,6 @@ class VisibilityBuffer:
             size: Image size in pixels.
             samples_per_axis: As many as sample_lattice.fitting allows, or fewer.
         """
-        self._gl = gl
         self._ctx = gl.ctx
         self._size = size
         self.per_axis = samples_per_axis
@@ -79,20 +57,20 @@ class VisibilityBuffer:
         assert row is not None, "more samples than `fitting` allows"
         self.inner_row = row
         self.to_clip = self._lattice.to_clip(size)
-        self._rows = self._layers = 0
+        self._rows = 0
         self._owned: list[Any] = []
-        self._rest: list[moderngl.TextureArray] = []
+        self._rest: list[moderngl.Texture] = []
         self._viewport = gl.function(
             "glViewportIndexedf", None, ctypes.c_uint, *[ctypes.c_float] * 4
         )
         self._scissor = gl.function("glScissorIndexed", None, ctypes.c_uint, *[ctypes.c_int] * 4)
         self._enable = gl.function("glEnablei", None, ctypes.c_uint, ctypes.c_uint)
         self._disable = gl.function("glDisablei", None, ctypes.c_uint, ctypes.c_uint)
-        self._attach = gl.function("glFramebufferTexture", None, *[ctypes.c_uint] * 3, ctypes.c_int)
+        self._clear = texture_clearing(gl)
 
     @property
-    def textures(self) -> dict[str, moderngl.TextureArray]:
-        """The textures by sampler name; valid until images make the buffer grow."""
+    def textures(self) -> dict[str, moderngl.Texture]:
+        """The textures by sampler name; valid until a scene makes the buffer grow."""
         names = (
             "surface_ids",
             "atlas_positions",
@@ -104,30 +82,34 @@ class VisibilityBuffer:
         rest = zip(("rest_x", "rest_y", "rest_z"), self._rest, strict=False)
         return {**dict(zip(names, usual, strict=True)), **dict(rest)}
 
-    def begin(self, layers: Sequence[LayerUse]) -> None:
+    def begin(
+        self,
+        damage: str,
+        seen: Sequence[Region | None],
+        rest: Sequence[Region | None] = (),
+        holes: Sequence[Region | None] = (),
+        over: bool = False,
+    ) -> None:
         """Clear the parts of the buffer that will be read, and bind it for undamaged surfaces.
 
         Args:
-            layers: What each image uses of its layer, from layer 0 on.
+            damage: One of DAMAGE_VARIANTS.
+            seen: Regions of the image that will be read; None is the whole image.
+            rest: Regions where rest positions will be read.
+            holes: Regions that `limit_inside` will name.
+            over: The surfaces are drawn over an image, which has its sky already.
         """
-        self._make_room(layers)
-        for layer, use in enumerate(layers):
-            self._empty(layer, use)
-        self._use(self._undamaged)
-
-    def _empty(self, layer: int, use: LayerUse) -> None:
-        """Clear the parts of a layer that will be read."""
-        clear = texture_clearing(self._gl, layer)
-        inside = [self._texels_inside(region) for region in use.holes]
-        for box in (*map(self._texels, use.seen), *inside):
-            clear(self._keys, box, NUMBERS, 0)
+        self._make_room(damage, seen)
+        for box in (*map(self._texels, seen), *map(self._texels_inside, holes)):
+            self._clear(self._keys, box, NUMBERS, 0)
         # with single samples the depth separates sky from surfaces, see ImageTargets.begin
-        outer = [None] if self.per_axis == 1 and not use.over else use.seen
-        for box in (*map(self._texels, outer), *inside):
-            clear(self.depth_buffer, box, DEPTHS, 1.0)
-        for box in map(self._texels, use.rest) if use.damage != "undamaged" else ():
+        outer = [None] if self.per_axis == 1 and not over else seen
+        for box in (*map(self._texels, outer), *map(self._texels_inside, holes)):
+            self._clear(self.depth_buffer, box, DEPTHS, 1.0)
+        for box in map(self._texels, rest) if damage != "undamaged" else ():
             for texture in self._rest:
-                clear(texture, box, FLOATS, _OUT_OF_REACH_MM)
+                self._clear(texture, box, FLOATS, _OUT_OF_REACH_MM)
+        self._use(self._undamaged)
 
     def limit(self, region: Region) -> None:
         """Restrict drawing to what pixels of a region read, until `end`."""
@@ -141,11 +123,17 @@ class VisibilityBuffer:
         target.use()
         target.viewport = (0, 0, *self._fine)
 
-    def _make_room(self, layers: Sequence[LayerUse]) -> None:
-        rows, count = max(map(self._rows_for, layers)), len(layers)
-        if rows > self._rows or count > self._layers:
-            self._rows, self._layers = max(rows, self._rows), max(count, self._layers)
+    def _make_room(self, damage: str, seen: Sequence[Region | None]) -> None:
+        rows = self._fine[1]
+        if damage == "holed":
+            rows += self.inner_row
+        elif self.per_axis > 1:  # the background pass needs all rows of single samples
+            _, tops, _, heights = zip((0, 0, 0, 0), *map(self._texels, seen), strict=True)
+            lowest = max(top + height for top, height in zip(tops, heights, strict=True))
+            rows = min(-(-max(lowest, 1) // _STEP_ROWS) * _STEP_ROWS, rows)
+        if rows > self._rows:
             self.release()
+            self._rows = rows
             self._keys = self._texture(1, "u4")
             # llvmpipe takes three times as long for four numbers a texel as for four textures of
             # one, and twice as long for bytes as for a number that holds four of them
@@ -153,39 +141,19 @@ class VisibilityBuffer:
             self._depths = self._texture(1, "f4")
             self._visibility = self._texture(1, "u4")
             self._light = self._texture(1, "u4")
-            self.depth_buffer = self._own(depth_layers(self._gl, self._extent))
+            self.depth_buffer = self._own(self._ctx.depth_texture((self._fine[0], rows)))
             self._undamaged = self._framebuffer()
-        if any(use.damage != "undamaged" for use in layers) and not self._rest:
+        if damage != "undamaged" and not self._rest:
             self._rest = [self._texture(1, "f4") for _ in range(3)]
             self._damaged = self._framebuffer()
 
-    def _rows_for(self, use: LayerUse) -> int:
-        """Return the rows of texels that an image needs."""
-        rows = self._fine[1]
-        if use.damage == "holed":
-            return rows + self.inner_row
-        if self.per_axis == 1:  # the background pass needs all rows of single samples
-            return rows
-        _, tops, _, heights = zip((0, 0, 0, 0), *map(self._texels, use.seen), strict=True)
-        lowest = max(top + height for top, height in zip(tops, heights, strict=True))
-        stepped: int = -(-max(lowest, 1) // _STEP_ROWS) * _STEP_ROWS
-        return min(stepped, rows)
-
-    @property
-    def _extent(self) -> tuple[int, int, int]:
-        """Width, height and layers of the textures."""
-        return self._fine[0], self._rows, self._layers
-
     def _framebuffer(self) -> moderngl.Framebuffer:
         usual = [self._keys, self._points, self._depths, self._visibility, self._light]
-        made: moderngl.Framebuffer = self._ctx.framebuffer([*usual, *self._rest])
-        made.use()
-        self._attach(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, self.depth_buffer.glo, 0)
-        made.depth_mask = True  # moderngl switches it off, because it does not know the attachment
+        made: moderngl.Framebuffer = self._ctx.framebuffer([*usual, *self._rest], self.depth_buffer)
         return self._own(made)
 
-    def _texture(self, components: int, dtype: str) -> moderngl.TextureArray:
-        made = self._ctx.texture_array(self._extent, components, dtype=dtype)
+    def _texture(self, components: int, dtype: str) -> moderngl.Texture:
+        made = self._ctx.texture((self._fine[0], self._rows), components, dtype=dtype)
         made.filter = (moderngl.NEAREST, moderngl.NEAREST)
         return self._own(made)
 

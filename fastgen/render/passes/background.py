@@ -61,7 +61,7 @@ class BackgroundPass:
             stages, replace(inputs.variant, damage="undamaged", lights=0, over=False)
         )
         self._ctx.scissor = None
-        only_sky = inputs.targets.begin(inputs.samples, inputs.layer, inputs.variant.over)
+        only_sky = inputs.targets.begin(inputs.samples, inputs.variant.over)
         self._ctx.enable_only(moderngl.DEPTH_TEST if only_sky else moderngl.NOTHING)
         if plan is not None:
             with DrawnTiles(self._ctx, plan.tiles, [plan.sky]) as drawn:

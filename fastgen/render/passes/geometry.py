@@ -11,7 +11,6 @@ from fastgen.render.draw_inputs import DrawInputs
 from fastgen.render.program import Programs, ShaderProgram
 from fastgen.render.regions import around, within
 from fastgen.render.variant import DAMAGE_VARIANTS, ShaderVariant
-from fastgen.render.visibility_buffer import LayerUse
 from fastgen.scene.damage_kinds import form_of
 
 
@@ -49,7 +48,7 @@ class GeometryPass:
         drawn = regions.drawn
         # other parts may keep an earlier image's rest positions: only rays read them everywhere
         rest = drawn if inputs.variant.traced else regions.near_damage
-        samples.begin([LayerUse(damage, drawn, rest, regions.holes, inputs.variant.over)])
+        samples.begin(damage, drawn, rest, regions.holes, inputs.variant.over)
         if not regions.surfaces:
             inputs.textures.update(samples.textures)
             return
@@ -89,7 +88,7 @@ class GeometryPass:
         samples, spreader = inputs.samples, inputs.spreader
         regions = within(inputs.regions.surfaces, (0, 0, *inputs.targets.size))
         assert spreader is not None, "only scenes with a spreader have regions of cables"
-        samples.begin([LayerUse("undamaged", regions, over=inputs.variant.over)])
+        samples.begin("undamaged", regions, over=inputs.variant.over)
         whole = around(regions)
         samples.limit(whole)
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
