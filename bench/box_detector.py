@@ -4,6 +4,7 @@ import contextlib
 import copy
 import io
 from collections.abc import Sequence
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,10 @@ class Detections(NamedTuple):
     def targets(self) -> list[dict[str, Any]]:
         """Labels of each image."""
         return [target for _, target in self.examples]
+
+    def where(self, chosen: Sequence[bool]) -> "Detections":
+        """Return the images for which `chosen` is true."""
+        return Detections(list(compress(self.examples, chosen)), list(compress(self.found, chosen)))
 
 
 def fit_detector(images: Sequence[BoxedImage], steps: int, seed: int) -> Detector:
@@ -74,7 +79,7 @@ def counts(seen: Detections, least_score: float) -> tuple[int, int, int]:
 
     Args:
         seen: Detections and labels.
-        least_score: Detections with a lower score are left out.
+        least_score: Lowest score of a detection that counts.
     """
     values, hit, labels = score(seen.targets, seen.found, _NAMES, _SIZE).scored[0]
     kept = values >= least_score

@@ -33,9 +33,10 @@ def fitted(image: BoxedImage) -> Example:
 
 
 def varied(image: BoxedImage, rng: np.random.Generator) -> Example:
-    """Return a random crop of an image, or the image with margins; half of them mirrored.
+    """Return a random crop of an image, or the whole image with a grey margin.
 
-    The scale is 0.5 to 1.5 times that of `fitted`. A tenth of the images has no color.
+    The scale is 0.5 to 1.5 times that of `fitted`, with a slight random stretch. Half of the
+    results are mirrored, and a tenth have no color.
     """
     height, width = image.pixels.shape[:2]
     scale = CANVAS_PX / max(width, height) * math.exp(rng.uniform(*np.log(_SCALES)))

@@ -243,20 +243,24 @@ def _by_kind_and_change(damaged: Array, undamaged: Array, pairs: Sequence[PanelP
 
 
 def containers(trial: Trial) -> Measures:
-    """Return AP50 of a detector of containers on ours and theirs, and recall at one score.
+    """Return AP50, recall and precision of a detector of containers on ours and theirs.
 
-    The score is the one with the best F1 on held-out renders.
+    Recall and precision are those of detections with at least `score`, which has the best F1 on
+    held-out renders.
     """
     model = fit_detector(trial.renders.boxed(trial.seed), trial.effort.box_steps, trial.seed)
     mine = trial.renders.held_out_boxed
-    groups = {
-        "ours, held out": mine,
-        **{f"ours, held out, {name}": [v for v in mine if v.preset == name] for name in PRESETS},
-        "theirs": trial.real.boxed,
+    ours = detect(model, mine)
+    seen = {
+        "ours, held out": ours,
+        **{
+            f"ours, held out, {name}": ours.where([v.preset == name for v in mine])
+            for name in PRESETS
+        },
+        "theirs": detect(model, trial.real.boxed),
     }
-    seen = {name: detect(model, images) for name, images in groups.items()}
     found: Measures = {f"{name}, AP50": ap50(each) for name, each in seen.items()}
-    least = best_score(seen["ours, held out"])
+    least = best_score(ours)
     found["score"] = Count(least)
     for name, each in seen.items():
         right, all_found, labels = counts(each, least)

@@ -21,8 +21,7 @@ _VIEWS = 2
 def boxed_renders(seed: int, scenes: range, workers: int) -> list[BoxedImage]:
     """Render the scenes of each preset, by two of its cameras in turn.
 
-    Boxes of containers of the surroundings, and of containers of which little is visible, are boxes
-    to ignore, as in label files.
+    As in label files, containers in the background and hardly visible ones have boxes to ignore.
 
     Args:
         seed: Seed of the scenes.

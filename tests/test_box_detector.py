@@ -218,9 +218,10 @@ def test_heat_in_ignored_regions_is_not_punished(monkeypatch):
     cells = 64 // STRIDE
     maps = {}
 
-    def loss(ignored, hot):
+    def loss(ignored, hot, centre=-4.0):
         heat = torch.full((1, 1, cells, cells), -4.0)
         heat[:, :, 8:12, 4:10] = hot
+        heat[:, :, 3, 3] = centre
         maps["now"] = heat, torch.zeros(1, 2, 4, cells, cells)
         return float(model.loss([image], [labelled([[0, 0, 24, 24]], ignored)]))
 
@@ -230,6 +231,7 @@ def test_heat_in_ignored_regions_is_not_punished(monkeypatch):
     assert loss([], 3.0) > loss([], -4.0) + 1
     # a label inside an ignored region is still learned
     assert loss([[0, 0, 64, 64]], 0.0) > 0.1
+    assert loss([[0, 0, 64, 64]], 0.0) > loss([[0, 0, 64, 64]], 0.0, centre=4.0) + 1
 
 
 def test_renders_have_boxes_of_all_presets_and_regions_to_ignore():

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import lru_cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -263,19 +262,11 @@ def test_outer_and_inner_view_may_share_two_texture_rows(generator, monkeypatch)
     with Generator(DAMAGED, seed=21, size=SIZE) as other:
         usual = other.render(scene=scene, camera="close")
 
-    class Shorter:
-        def __init__(self, ctx):
-            self._ctx = ctx
-            self.info = {**ctx.info, "GL_MAX_TEXTURE_SIZE": 2 * (2 * SIZE[1] + 1) - 2}
-
-        def __getattr__(self, name):
-            return getattr(self._ctx, name)
-
     shortened = []
 
     def made(gl, *rest):
-        short_gl = SimpleNamespace(ctx=Shorter(gl.ctx), function=gl.function)
-        shortened.append(VisibilityBuffer(short_gl, *rest))
+        monkeypatch.setitem(gl.ctx.info, "GL_MAX_TEXTURE_SIZE", 2 * (2 * SIZE[1] + 1) - 2)
+        shortened.append(VisibilityBuffer(gl, *rest))
         return shortened[-1]
 
     monkeypatch.setattr("fastgen.render.recent_targets.VisibilityBuffer", made)

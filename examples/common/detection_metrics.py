@@ -1,8 +1,9 @@
 """COCO metrics by size and class, precision and recall at one score, and confusion of classes.
 
-Targets are in the loader's detection form, detections in the form of `Detector.predict`. Labels
-with `iscrowd` are regions to ignore, as in COCO: they need not be found, and detections inside them
-do not count. All shares are in percent, and nan if there is nothing to measure.
+Targets are in the loader's detection form, detections in the form of `Detector.predict`. All shares
+are in percent, and nan if there is nothing to measure. In `score` and `matched`, labels with
+`iscrowd` are regions to ignore, as in COCO: they need not be found, and detections inside them do
+not count.
 """
 
 import contextlib

@@ -132,8 +132,8 @@ def visible_share(values: NDArray[np.uint8]) -> NDArray[np.float32]:
     Args:
         values: uint8 [V, 3 or more], which begin with the cones of `encoded_cones`.
     """
-    x, y, z = np.subtract(values[:, :3].T, 128, dtype=np.float32)
-    rim = np.clip(2 - 2 / 127 * np.sqrt(x * x + y * y + z * z), 0, 1)
+    _, length = _decoded(values[:, :3])
+    rim = np.clip(2 - 2 / 127 * length, 0, 1)
     return np.asarray(1 - rim * rim, np.float32)
 
 
@@ -336,9 +336,16 @@ def _narrow(index: NDArray[np.intp]) -> Index:
 
 def _directions(cone: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Return the bent normals [K, 3] of encoded cones [K, 3]."""
-    x, y, z = np.subtract(cone.T, 128, dtype=np.float32)
-    normals: NDArray[np.float32] = (np.stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)).T
+    bent, length = _decoded(cone)
+    normals: NDArray[np.float32] = (bent / length).T
     return normals
+
+
+def _decoded(cone: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return 127 v [3, K] of encoded cones [K, 3], see `encoded_cones`, and its length [K]."""
+    bent = np.subtract(cone.T, 128, dtype=np.float32)
+    x, y, z = bent
+    return bent, np.sqrt(x * x + y * y + z * z)
 
 
 def _sums_of_eight(weight: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -56,8 +56,8 @@ class SurroundingLight:
         Args:
             values: Vertex bytes [V, VERTEX_BYTES] of the container in the open, see
                 SkyVisibility.vertex_bytes.
-            light: Irradiance / pi [V, 3] there, without directional lights.
-            mesh: Its mesh.
+            light: Irradiance / pi [V, 3] of the container in the open, without directional lights.
+            mesh: The container's mesh.
         """
         corner, weight = _lattice_places(mesh)
         found = values.copy()
@@ -74,10 +74,10 @@ class SurroundingLight:
     ) -> NDArray[np.float32]:
         """Return irradiance / pi float32 [V, 3] in these surroundings, without directional lights.
 
-        What the container hides of its surroundings at a vertex, it hides of the added light, too.
-        The light from below the horizon is interpolated between the sides by the squares of the
-        normal (McTaggart 2004, Half-Life 2 / Valve Source Shading, ambient cube). The arguments are
-        those of `applied`.
+        The container hides part of the surroundings from each vertex, so the added light is scaled
+        by the share of its hemisphere that a vertex sees. The light from below the horizon is
+        interpolated between the sides by the squares of the normal (McTaggart 2004, Half-Life 2 /
+        Valve Source Shading, ambient cube). The arguments are those of `applied`.
         """
         visible, sides = visible_share(values), _sides(mesh)
         corner, weight = _lattice_places(mesh)

@@ -258,7 +258,7 @@ def _sums(values: Array, at: NDArray[np.intp], count: int) -> Array:
 
 def _mean_by_side(weighted: Array, normals: Array) -> NDArray[np.float32]:
     """Return the mean radiance [6, 3] on each side of sums and weights [P, 4]."""
-    sides = np.stack([normals[:, axis] * sign > 0.5 for axis, sign in FACES]).astype(float)
+    sides = (side_of(normals) == np.arange(len(FACES))[:, None]).astype(float)
     found = sides @ weighted
     return np.asarray(found[:, :3] / np.maximum(found[:, 3:], 1e-6), np.float32)
 
