@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
@@ -15,7 +16,7 @@ from fastgen.generator import Generator
 from fastgen.geometry.container import build_container
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.seals import hasp_middle_mm, scene_seals
-from fastgen.scene import Camera, Damage, Lens, Scene, Seal
+from fastgen.scene import Camera, Damage, Lens, Neighbour, Pose, Scene, Seal
 from tests import oracle
 from tests.mesh_probe import winding_normals
 
@@ -250,3 +251,21 @@ def test_an_exported_scene_has_its_seals(generator, scene, tmp_path):
     assert sum(len(parts[name].faces) for name in names) == len(seals.triangles)
     blue = parts["seal_1"].visual.material.baseColorFactor
     assert blue[:3] == pytest.approx([round(255 * c) for c in ALL[1].albedo], abs=1)
+
+
+def test_a_seal_is_as_shaded_by_a_neighbour_as_the_door_behind_it(generator, scene):
+    """A container 1.2 m before the door hides most of the sky from both."""
+    kind = scene.container.kind
+    albedo = (0.4, 0.4, 0.4)
+    alone = replace(scene, seals=(Seal("bolt", 1, albedo=albedo),), decals=())
+    place = (build_container(kind).bounds_mm[1][0] * 2 + 1200.0, 0.0, 0.0)
+    beside = replace(alone, neighbours=(Neighbour(Pose(place), scene.container, scene.surface),))
+    camera = looking_at(scene, 1, (600.0, 0.0, 0.0))
+    found = []
+    for each in (alone, beside):
+        sample = generator.render(scene=each, camera=camera)
+        light = (sample.image / 255).mean(axis=2) ** 2.2
+        seal = sample.ids == oracle.SEAL + 1
+        around = cv2.dilate(seal.astype(np.uint8), np.ones((25, 25), np.uint8)) > 0
+        found.append(light[seal].mean() / light[around & ~seal].mean())
+    assert found[1] == pytest.approx(found[0], rel=0.3)

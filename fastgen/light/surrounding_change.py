@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.geometry.mesh import Mesh
-from fastgen.light.sky_visibility import visible_share
+from fastgen.light.sky_visibility import Sky, SkyVisibility, visible_share
 
 LIFT_MM = 5.0
 """Distance of the points from the box."""
@@ -17,8 +17,6 @@ _STEP_MM = 1000.0
 
 _LEAST = 0.02
 """Least light of a vertex, relative to the open."""
-
-_DARK = 1e-9
 
 FACES = [(axis, sign) for axis in range(3) for sign in (-1, 1)]
 """Axis and direction of the faces of a box, in the order of all arrays here."""
@@ -49,22 +47,25 @@ class SurroundingLight:
     ground: NDArray[np.float32] | None
 
     def applied(
-        self, values: NDArray[np.uint8], light: NDArray[np.float32], mesh: Mesh
+        self,
+        visibility: SkyVisibility,
+        sky: Sky,
+        values: NDArray[np.uint8],
+        light: NDArray[np.float32],
+        mesh: Mesh,
     ) -> NDArray[np.uint8]:
         """Return vertex bytes in these surroundings.
 
         Args:
+            visibility: Sky that the container leaves visible.
+            sky: The environment.
             values: Vertex bytes [V, VERTEX_BYTES] of the container in the open, see
                 SkyVisibility.vertex_bytes.
             light: Irradiance / pi [V, 3] of the container in the open, without directional lights.
             mesh: The container's mesh.
         """
         corner, weight = _lattice_places(mesh)
-        found = values.copy()
-        changed = self.vertex_light(values, light, mesh)
-        for channel in range(3):
-            factor = changed[:, channel] / np.maximum(light[:, channel], _DARK)
-            found[:, 4 + channel] = np.minimum(values[:, 4 + channel] * factor + 0.5, 255)
+        found = visibility.vertex_bytes(sky, self.vertex_light(values, light, mesh))
         nearest = np.take_along_axis(corner, weight.argmax(axis=0)[None], axis=0)[0]
         found[:, 8:] &= self.open_bits.take(nearest, axis=0)
         return found
@@ -77,7 +78,7 @@ class SurroundingLight:
         The container hides part of the surroundings from each vertex, so the added light is scaled
         by the share of its hemisphere that a vertex sees. The light from below the horizon is
         interpolated between the sides by the squares of the normal (McTaggart 2004, Half-Life 2 /
-        Valve Source Shading, ambient cube). The arguments are those of `applied`.
+        Valve Source Shading, ambient cube). The arguments are three of `applied`.
         """
         visible, sides = visible_share(values), _sides(mesh)
         corner, weight = _lattice_places(mesh)

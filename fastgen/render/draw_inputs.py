@@ -23,7 +23,6 @@ from fastgen.render.regions import (
     region_of,
     within,
 )
-from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Damage
@@ -144,7 +143,6 @@ class DrawInputs:
         damages: Damages that this view may show.
         container, seals, spreader: Meshes with the sky visibility of the scene; None for seals and
             spreader where the scene has none.
-        lit: Light at the vertices of container and spreader.
         regions: Where the passes have work.
         targets: Where the image goes.
         samples: The visibility buffer, with as many samples as the variant says.
@@ -159,7 +157,6 @@ class DrawInputs:
     container: GpuMesh
     seals: GpuMesh | None
     spreader: GpuMesh | None
-    lit: tuple[LitMesh, ...]
     regions: Regions
     targets: ImageTargets
     samples: VisibilityBuffer

@@ -234,10 +234,10 @@ class Renderer:
         light, ambient = self._lights.of(environment.name), self.ambient(environment)
         resources = self._materials.resources(prepared)
         near = None if around is None else around[prepared]
-        container, spreader, lit = self._shapes.of(
+        container, spreader, below = self._shapes.of(
             prepared, resources.materials, lens, ambient, near
         )
-        seals = self._shapes.seals(prepared, lit[0])
+        seals = self._shapes.seals(prepared, below)
         decals = resources.decals(scale_for(prepared.container, view))
         ground = None if near is None else near.ground
         self._blocks.scene(prepared, decals, len(light.background), ground)
@@ -249,7 +249,6 @@ class Renderer:
             container=container,
             seals=seals,
             spreader=spreader,
-            lit=lit,
             regions=regions_of(view, prepared, damages, apart=per_axis < of_cables),
             targets=self._targets.image(size, options.radiance),
             samples=samples,

@@ -1,6 +1,7 @@
 """Containers, seals and spreaders on the GPU, with the light at their vertices."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import moderngl
 import numpy as np
@@ -39,7 +40,7 @@ class Shapes:
         self._spreaders: ReleasingCache[GpuMesh] = ReleasingCache(64)
         self._seals: ReleasingCache[GpuMesh] = ReleasingCache(2)
         self._gear: RecentCache[NDArray[np.int64]] = RecentCache(2)
-        self._surrounded: RecentCache[NDArray[np.uint8]] = RecentCache(_SURROUNDED)
+        self._surrounded: RecentCache[LitMesh] = RecentCache(_SURROUNDED)
         self._zones: ReleasingCache[moderngl.Texture] = ReleasingCache(128)
         self._probe = SkyVisibilityProbe(ctx)
 
@@ -50,7 +51,7 @@ class Shapes:
         lens: bool,
         light: Ambient,
         surroundings: SurroundingLight | None = None,
-    ) -> tuple[GpuMesh, GpuMesh | None, tuple[LitMesh, ...]]:
+    ) -> tuple[GpuMesh, GpuMesh | None, LitMesh]:
         """Return the container and spreader of a scene, ready to be drawn.
 
         Args:
@@ -61,23 +62,19 @@ class Shapes:
             surroundings: What other containers and the ground change in the light on the container.
 
         Returns:
-            The container, the spreader or None, and the light at the vertices of each.
+            The container, the spreader or None, and the light at the vertices of the container,
+            whose irradiance is that in the open.
         """
         mesh, shape = self.container(prepared), prepared.spreader
-        lit = self.light(prepared, materials, lens, light)
-        below, *above = lit
-        values = below.values
+        below, *above = self.light(prepared, materials, lens, light)
         if surroundings is not None:
-            values = self._surrounded.get(
-                (below, surroundings),
-                lambda: surroundings.applied(below.values, below.without_lights, mesh.mesh),
-            )
-        mesh.set_sky_visibility(values)
+            below = self._in_surroundings(prepared, below, _sky_of(prepared, light), surroundings)
+        mesh.set_sky_visibility(below.values)
         if shape is None:
-            return mesh, None, lit
+            return mesh, None, below
         spreader = self._drawn_spreader(shape.drawn(lens))
         spreader.set_sky_visibility(above[0].values)
-        return mesh, spreader, lit
+        return mesh, spreader, below
 
     def light(
         self, prepared: PreparedScene, materials: SceneMaterials, lens: bool, light: Ambient
@@ -87,7 +84,7 @@ class Shapes:
         The arguments are those of `of`.
         """
         mesh, shape, usual = prepared.container, prepared.spreader, prepared.usual_spreader
-        sky = Sky(light, prepared.scene.environment.yaw_deg)
+        sky = _sky_of(prepared, light)
         below = self._probe.container_light(mesh, None if usual is None else usual.mesh, sky)
         if shape is None or usual is None:
             return (below,)
@@ -98,6 +95,20 @@ class Shapes:
             probed, outline, prepared.nominal_outline, below, sky, materials.reflectances
         )
         return below, above
+
+    def _in_surroundings(
+        self, prepared: PreparedScene, below: LitMesh, sky: Sky, surroundings: SurroundingLight
+    ) -> LitMesh:
+        """Return a container, lit in the open, with its vertex bytes in these surroundings."""
+        usual = prepared.usual_spreader
+        visibility = self._probe.container_visibility(below.mesh, usual.mesh if usual else None)
+        open_, light = below.values, below.without_lights
+
+        def found() -> LitMesh:
+            values = surroundings.applied(visibility, sky, open_, light, below.mesh)
+            return replace(below, values=values)
+
+        return self._surrounded.get((below, surroundings), found)
 
     def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
         """Load the meshes of a scene and all that their light needs; see Renderer.preload."""
@@ -154,3 +165,7 @@ class Shapes:
         """Free all GL objects."""
         for kept in (self._containers, self._seals, self._spreaders, self._zones, self._probe):
             kept.release()
+
+
+def _sky_of(prepared: PreparedScene, light: Ambient) -> Sky:
+    return Sky(light, prepared.scene.environment.yaw_deg)
