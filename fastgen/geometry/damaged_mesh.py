@@ -28,9 +28,12 @@ _SLOPE_STEP_MM = 0.5
 
 _REST, _MOVED, _NORMAL, _ATLAS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 11)
 _SPARED = 11
-"""Columns of the corner arrays [T, 3, 12] in this module; `spared` is 1 for parts without holes."""
+"""Columns of the vertex arrays [V, 12] in this module; `spared` is 1 for parts without holes."""
 
 Array = NDArray[np.float64]
+
+Triangles = NDArray[np.intp]
+"""Vertices of triangles or edges."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,90 +59,115 @@ def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
     spared = np.array([is_gear(chart) for chart in mesh.charts])[mesh.chart, None]
     moved = deform(damages, rest)
     vertices = np.concatenate([rest, moved, mesh.normals, mesh.atlas_mm, spared], axis=1)
-    corners = vertices[mesh.triangles]
-    kept = np.ones(len(corners), bool)
-    made = []
+    coarse = mesh.triangles.astype(np.intp)
+    made = [np.empty((0, 3), np.intp)]
     for damage in damages:
         if form_of(damage).amount is None:
             continue
-        near = kept & _within_reach(damage, corners)
-        kept &= ~near
+        near = _within_reach(damage, vertices, coarse)
         # pieces that one damage has divided are small enough for the next
-        part = _refined(corners[near], BENT_EDGE_MM)
+        vertices, part = _refined(vertices, coarse[near], BENT_EDGE_MM)
         made.append(part)
-    fine = np.concatenate([np.empty((0, 3, vertices.shape[1])), *made])
+        coarse = coarse[~near]
+    fine = np.concatenate(made)
     for damage in damages:
         if form_of(damage).outline:
-            near = _within_reach(damage, fine) & (fine[:, 0, _SPARED] == 0)
-            fine = np.concatenate([fine[~near], _cut(damage, _refined(fine[near], HOLE_EDGE_MM))])
+            near = _within_reach(damage, vertices, fine) & (vertices[fine[:, 0], _SPARED] == 0)
+            vertices, part = _refined(vertices, fine[near], HOLE_EDGE_MM)
+            vertices, part = _cut(damage, vertices, part)
+            fine = np.concatenate([fine[~near], part])
 
-    used, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
-    flat = fine.reshape(-1, vertices.shape[1])
-    added = np.arange(len(flat)).reshape(-1, 3) + len(used)
-    whole = np.concatenate([vertices[used], flat])
+    triangles = np.concatenate([coarse, fine])
+    used = np.zeros(len(vertices), bool)
+    used[triangles] = True
+    whole = vertices[used]
     return DamagedMesh(
         positions_mm=whole[:, _MOVED],
         normals=_bent_normals(damages, whole[:, _REST], whole[:, _NORMAL]),
         atlas_mm=whole[:, _ATLAS],
-        triangles=np.concatenate([triangles.reshape(-1, 3), added]).astype(np.uint32),
+        triangles=(np.cumsum(used) - 1)[triangles].astype(np.uint32),
     )
 
 
-def _within_reach(damage: Damage, corners: Array) -> NDArray[np.bool_]:
+def _within_reach(damage: Damage, vertices: Array, triangles: Triangles) -> NDArray[np.bool_]:
     """Test which triangles a damage may move or tear; bool [T]."""
-    local = np.stack(local_coordinates(damage, corners[..., _REST]), axis=-1)
+    local = np.stack(local_coordinates(damage, vertices[:, _REST]), axis=-1)[triangles]
     reach = np.array(reach_mm(damage))
     touches: NDArray[np.bool_] = ((local.min(1) < reach) & (local.max(1) > -reach)).all(axis=1)
     return touches
 
 
-def _refined(corners: Array, max_edge_mm: float) -> Array:
-    """Divide triangles into four until no edge at rest is longer than max_edge_mm."""
+def _refined(vertices: Array, triangles: Triangles, max_edge_mm: float) -> tuple[Array, Triangles]:
+    """Divide triangles into four until no edge at rest is longer than max_edge_mm.
+
+    Returns:
+        The vertices, with the middles of divided edges appended, and the new triangles.
+    """
     done = []
-    while len(corners):
-        rest = corners[..., _REST]
+    while len(triangles):
+        rest = vertices[triangles, _REST]
         edges = np.linalg.norm(rest - np.roll(rest, 1, axis=1), axis=-1)
         long = edges.max(axis=1) > max_edge_mm
-        done.append(corners[~long])
-        a, b, c = np.moveaxis(corners[long], 1, 0)
-        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        done.append(triangles[~long])
+        a, b, c = triangles[long].T
+        ends, middles = _shared(len(vertices), np.stack([a, b, c]), np.stack([b, c, a]))
+        ab, bc, ca = middles + len(vertices)
+        vertices = np.concatenate([vertices, vertices[ends].mean(axis=0)])
         quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-        corners = np.concatenate([np.stack(quarter, axis=1) for quarter in quarters])
-    return np.concatenate(done) if done else corners
+        triangles = np.concatenate([np.stack(quarter, axis=1) for quarter in quarters])
+    return vertices, np.concatenate([triangles, *done])
 
 
-def _cut(hole: Damage, corners: Array) -> Array:
-    """Cut a perforation out of small triangles, along straight pieces of its outline."""
-    u, v, w = local_coordinates(hole, corners[..., _REST])
+def _shared(count: int, start: Triangles, end: Triangles) -> tuple[Triangles, Triangles]:
+    """Return each edge once, whatever its direction.
+
+    Args:
+        count: Number of vertices.
+        start: First vertex of each edge [...].
+        end: Second vertex of each edge [...].
+
+    Returns:
+        The lower and the higher vertex of each edge that occurs, [2, E]; and the place of the given
+        edges among them [...].
+    """
+    keys = np.minimum(start, end) * count + np.maximum(start, end)
+    each, places = np.unique(keys, return_inverse=True)
+    return np.stack(np.divmod(each, count)), places.reshape(keys.shape)
+
+
+def _cut(hole: Damage, vertices: Array, triangles: Triangles) -> tuple[Array, Triangles]:
+    """Cut a perforation out of small triangles, along straight pieces of its outline.
+
+    Returns:
+        The vertices, with the ends of those pieces appended, and the triangles that are left.
+    """
+    touched, places = np.unique(triangles, return_inverse=True)
+    u, v, w = local_coordinates(hole, vertices[touched, _REST])
     outline = form_of(hole).outline
     assert outline is not None
-    outside_mm = outline(hole, u, v)
-    level = np.maximum(outside_mm, np.abs(w) - FADE_START_MM)
-    left = (level >= 0).sum(axis=1)
-    one, two = (corners[left == count] for count in (1, 2))
-    parts = [corners[left == 3]]
-    if len(one):
-        a, b, c, at = _turned(one, level[left == 1], (level[left == 1] >= 0).argmax(axis=1))
-        parts.append(np.stack([a, _crossing(a, b, at, 1), _crossing(a, c, at, 2)], axis=1))
-    if len(two):
-        a, b, c, at = _turned(two, level[left == 2], (level[left == 2] < 0).argmax(axis=1))
-        ab, ca = _crossing(a, b, at, 1), _crossing(a, c, at, 2)
-        parts += [np.stack([ab, b, c], axis=1), np.stack([ab, c, ca], axis=1)]
-    return np.concatenate(parts)
+    level = np.maximum(outline(hole, u, v), np.abs(w) - FADE_START_MM)
+    outside = (level >= 0)[places.reshape(-1, 3)]
+    left = outside.sum(axis=1)
+    one, two = left == 1, left == 2
+    # corner a is the only one outside, or the only one within
+    a, b, c = _turned(triangles[one], outside[one].argmax(axis=1))
+    d, e, f = _turned(triangles[two], (~outside[two]).argmax(axis=1))
+    ends, crossings = _shared(
+        len(vertices), np.concatenate([a, a, d, d]), np.concatenate([b, c, e, f])
+    )
+    low, high = level[np.searchsorted(touched, ends)]
+    share = (low / (low - high))[:, None]
+    added = vertices[ends[0]] + share * (vertices[ends[1]] - vertices[ends[0]])
+    ab, ac, de, df = np.split(crossings + len(vertices), np.cumsum([len(a), len(a), len(d)]))
+    parts = [(a, ab, ac), (de, e, f), (de, f, df)]
+    kept = [np.stack(part, axis=1) for part in parts]
+    return np.concatenate([vertices, added]), np.concatenate([triangles[left == 3], *kept])
 
 
-def _turned(corners: Array, level: Array, first: NDArray[np.intp]) -> tuple[Array, ...]:
-    """Return corners a, b, c [T, 12] and levels [T, 3], rotated so that `first` is corner a."""
+def _turned(triangles: Triangles, first: Triangles) -> Triangles:
+    """Return corners a, b and c of triangles, [3, T], rotated so that corner `first` is a."""
     order = (first[:, None] + np.arange(3)) % 3
-    rows = np.arange(len(corners))[:, None]
-    turned = corners[rows, order]
-    return turned[:, 0], turned[:, 1], turned[:, 2], level[rows, order]
-
-
-def _crossing(a: Array, other: Array, level: Array, corner: int) -> Array:
-    """Interpolate the points [T, 12] of level 0 between corner 0 and another corner."""
-    share = level[:, :1] / (level[:, :1] - level[:, corner : corner + 1])
-    return a + share * (other - a)
+    return np.take_along_axis(triangles, order, axis=1).T
 
 
 def _bent_normals(damages: tuple[Damage, ...], rest_mm: Array, normals: Array) -> Array:

@@ -2,11 +2,12 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 
 import moderngl
 
-from fastgen.classes import BUNDLED_DAMAGE_CLASSES
+from fastgen.classes import BUNDLED_DAMAGE_CLASSES, DRAWN_DAMAGE_CLASSES
 from fastgen.errors import ConfigError
 from fastgen.render.blocks import BLOCKS
 from fastgen.render.constants import constants_text
@@ -195,7 +196,11 @@ class Programs:
 
     def get(self, stages: Sequence[str], variant: ShaderVariant | None = None) -> ShaderProgram:
         """Return the program of some shader files for a variant."""
-        key = (tuple(stages), variant or ShaderVariant())
+        variant = variant or ShaderVariant()
+        if variant.damage == "undamaged":
+            # no kind is drawn; with one text for all, drivers that cache on disk compile it once
+            variant = replace(variant, kinds=DRAWN_DAMAGE_CLASSES)
+        key = (tuple(stages), variant)
         if key not in self._linked:
             self._linked[key] = ShaderProgram(self._ctx, *key, self._read)
         return self._linked[key]
