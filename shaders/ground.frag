@@ -63,7 +63,7 @@ vec4 seen_color(vec3 ray, out float depth) {
     color = ground_color(at, ray, isinf(depth) ? 1.0 : depth);
 #endif
 #endif
-#if GROUND_FADES && GROUND_PLANE && LAYER == LAYER_ALL
+#if GROUND_PLANE && LAYER == LAYER_ALL
     if (share < 1.0) {
         vec3 behind = exposure * background(ray);
         color = share > 0.0 ? mix(behind, color, share) : behind;

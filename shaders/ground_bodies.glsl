@@ -1,5 +1,5 @@
 // Boxes of the containers and props on the ground, turned about z. Containers are bodies 0 to
-// GROUND_BOXES - 1; EACH_BOX(f) expands to f(i) for each. Props follow from MAX_BOXES.
+// box_count - 1; EACH_BOX(f) runs f(i) for each if GROUND_BOXES is set. Props follow from MAX_BOXES.
 // vec3 in_body(vec3 v, int i): a world vector in the axes of body i.
 // float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m): share of a distant disc
 // that body i hides.
@@ -9,6 +9,12 @@
 #include "ground.constants"
 #include "units.constants"
 #include "ground.block"
+
+#if GROUND_BOXES
+#define EACH_BOX(f) for (int box = 0; box < box_count; ++box) f(box)
+#else
+#define EACH_BOX(f)
+#endif
 
 struct BodyHit {
     float depth;   // In lengths of the ray; infinite for a miss.

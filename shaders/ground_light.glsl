@@ -32,6 +32,7 @@ float below_boxes(vec3 at) {
 // Share of the first light that boxes hide, or more where they hide one another.
 float hidden_by_boxes(vec3 at, float blur_m) {
     float hidden = 0.0;
+    if (light_count == 0) return hidden;
 #define FIRST_LIGHT(i) { \
     vec3 enter; \
     hidden += hidden_share(in_body(at - body_center[i].xyz, i), body_half[i].xyz, body_light[i].xyz, \
@@ -42,10 +43,9 @@ float hidden_by_boxes(vec3 at, float blur_m) {
 
 // hidden: Share of the first light that is hidden. blur_m: Radius over which shadows are filtered.
 vec3 ground_lights(vec3 at, vec3 normal, float hidden, float blur_m) {
-    vec3 sum = vec3(0.0);
-#if LIGHTS > 0
+    if (light_count == 0) return vec3(0.0);
     float facing = max(dot(normal, light_direction[0].xyz), 0.0);
-    sum = light_irradiance[0].rgb * (facing * max(1.0 - hidden, 0.0));
+    vec3 sum = light_irradiance[0].rgb * (facing * max(1.0 - hidden, 0.0));
     for (int i = 1; i < LIGHTS; ++i) {
         vec4 light = light_direction[i];
         hidden = 0.0;
@@ -53,6 +53,5 @@ vec3 ground_lights(vec3 at, vec3 normal, float hidden, float blur_m) {
         EACH_BOX(OTHER_LIGHT)
         sum += light_irradiance[i].rgb * (max(dot(normal, light.xyz), 0.0) * max(1.0 - hidden, 0.0));
     }
-#endif
     return sum;
 }

@@ -14,7 +14,7 @@ uniform sampler2D obstacle_map;   // Share of containers and other obstacles; oc
 float seen_plane(vec3 ray, out vec3 at, out float share) {
     float depth = plane_depth(ray, at);
     share = isinf(depth) ? 0.0 : 1.0;
-#if GROUND_FADES
+#if GROUND_PLANE
     float away_m = length(at.xy);
     if (isinf(depth) || away_m < ground_clear_m) return depth;
     vec2 uv = bordered(octahedral(to_environment(ray)), float(textureSize(obstacle_map, 0).x));

@@ -121,7 +121,7 @@ def test_all_other_shaders_are_standard_glsl(programs):
     programs.add(("occluder.vert", "occluder.frag"), ShaderVariant())
     for kind, wet, coarse in zip(GROUNDS, (False, True, True), (True, False, True), strict=True):
         ground = GroundVariant(
-            kind, boxes=2, wet=wet, fades=wet, props=not coarse, shadows=coarse, coarse=coarse
+            kind, boxes=True, wet=wet, props=not coarse, shadows=coarse, coarse=coarse
         )
         variant = ShaderVariant(lookups=2 - coarse, lights=MAX_LIGHTS if wet else 1, ground=ground)
         programs.add(("rectangles.vert", "ground.frag"), variant)

@@ -172,7 +172,6 @@ def test_scenes_without_ground_and_repeated_scenes_are_bit_identical(generator, 
 
 @pytest.mark.parametrize("count", [2, 4])
 def test_containers_behind_the_camera_hardly_change_the_ground(generator, scene, count):
-    """Programs are compiled for more containers than these scenes have."""
     far = tuple(
         Neighbour(Pose((0.0, -20000.0 - 3000.0 * i, -1200.0)), scene.container, scene.surface)
         for i in range(count)

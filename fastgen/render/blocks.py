@@ -135,6 +135,7 @@ GROUND_BLOCK = Block(
         ("float", "puddle_threshold"),
         ("float", "slab_mm"),
         ("float", "ground_clear_m"),
+        ("int", "box_count"),  # containers
     ),
 )
 

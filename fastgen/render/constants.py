@@ -80,8 +80,6 @@ _SKY_DEPTH = 1 - 2**-18
 """Clip-space depth of the background over w: below 1 because clipping may round, and behind
 everything nearer than 198 m."""
 
-_MOST_COPIES = 8
-
 GROUND_FADE_START = 0.5
 """Share of the ground's reach at which it starts to fade into the panorama."""
 
@@ -189,29 +187,17 @@ def _environment(_: ShaderVariant) -> Defines:
     }
 
 
-def _each(name: str, count: int) -> str:
-    """Return GLSL that expands a macro for each number below a count.
-
-    llvmpipe reads blocks slowly by computed indices, but many copies take seconds to compile.
-    """
-    if count <= _MOST_COPIES:
-        return " ".join(f"{name}({i})" for i in range(count))
-    return f"for (int box = 0; box < {count}; ++box) {name}(box)"
-
-
 def _ground(v: ShaderVariant) -> Defines:
     ground = v.ground
     return {
         **{f"GROUND_{kind.upper()}": int(kind == ground.kind) for kind in GROUNDS},
-        "GROUND_BOXES": ground.boxes,
+        "GROUND_BOXES": int(ground.boxes),
         "GROUND_LENS": int(ground.lens),
         "GROUND_WET": int(ground.wet),
-        "GROUND_FADES": int(ground.fades),
         "GROUND_PLANE": int(ground.plane),
         "GROUND_SHADOWS": int(ground.shadows),
         "GROUND_PROPS": int(ground.props),
         "GROUND_COARSE": int(ground.coarse),
-        "EACH_BOX(f)": _each("f", ground.boxes),
         "GROUND_FADE_START": GROUND_FADE_START,
         "LINE_MM": LINE_MM,
         "MAX_BOXES": MAX_BOXES,

@@ -11,7 +11,6 @@ from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import inward_mm
 from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.geometry.prepared_scene import Member
-from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.ground_values import clear_radius_mm
 from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
@@ -34,9 +33,6 @@ _SKIN_MM = 150.0
 _LEAST_AWAY_MM = 5 * NEAR_M / MM
 """Distance of a container to the camera from which the near plane cuts off no visible part of it;
 rays are at most 78 degrees off the axis."""
-
-_BOX_COUNTS = (0, 1, 2, 4, 8, MAX_BOXES)
-"""Numbers of containers that programs are compiled for."""
 
 Array = NDArray[np.float64]
 
@@ -110,16 +106,10 @@ def ground_plan(
     elif members:
         boxes = [member.box for member in members]
         dark = _any(tiles.touched(_reaches(boxes, ground.height_mm, toward, _BLURRED_MM)))
-    count = next(most for most in _BOX_COUNTS if most >= len(members))
-    plain = GroundVariant(ground.kind, 0, view.distortion is not None, wet)
-    far = replace(plain, fades=True)
-    near_bodies = replace(far, boxes=count, shadows=bool(props))
-    seen, alone = seen & ~hidden, seen & ~(hidden | dark | shaded)
-    plane = [
-        GroundDraw(plain, alone & near),
-        GroundDraw(far, alone & ~near),
-        GroundDraw(near_bodies, seen & ~alone),
-    ]
+    plain = GroundVariant(ground.kind, False, view.distortion is not None, wet)
+    near_bodies = replace(plain, boxes=bool(members), shadows=bool(props))
+    alone = seen & ~(hidden | dark | shaded)
+    plane = [GroundDraw(plain, alone), GroundDraw(near_bodies, seen & ~hidden & ~alone)]
     return GroundPlan(
         tiles,
         sky=~hidden & ~near,

@@ -24,9 +24,6 @@ _LEAST_GAP_M = 1e-3
 _CLEARANCE_MM = 1500.0
 """Width of the ground around the scene that no part of the panorama hides."""
 
-_FAR_BELOW_M = -1e4
-"""Height of boxes that a program has but the scene has not."""
-
 
 def ground_values(
     ground: Ground,
@@ -46,8 +43,6 @@ def ground_values(
     """
     bodies = [member.box for member in members] + [prop_box(prop) for prop in props]
     rows = np.zeros((3, MAX_BOXES + len(props), 4))
-    rows[0, len(members) : MAX_BOXES, 2] = _FAR_BELOW_M
-    rows[2, len(members) : MAX_BOXES, 3] = _NO_GAP_M
     places = [*range(len(members)), *range(MAX_BOXES, MAX_BOXES + len(props))]
     for place, body in zip(places, bodies, strict=True):
         rows[0, place] = *body.center_mm * MM, body.rotation[0, 0]
@@ -60,7 +55,7 @@ def ground_values(
     for place, prop in enumerate(props, MAX_BOXES):
         rows[2, place] = *prop.albedo, 2.0 if prop.shape == "cylinder" else 0.0
     turned = np.array([body.axes @ toward for body in bodies]).reshape(-1, 3)
-    inverse = np.ones((len(rows[0]), 4))  # zeros would make boxes that are not there NaN
+    inverse = np.zeros((len(rows[0]), 4))
     inverse[places, :3] = 1 / np.where(np.abs(turned) < 1e-6, 1e-6, turned)
     scale = 1 / (light.step_m * GRID)
     yaw = np.deg2rad(ground.line_yaw_deg)
@@ -86,6 +81,7 @@ def ground_values(
         "damp_threshold": 1.35 - 2.1 * wet if wet else 9.0,
         "puddle_threshold": 1.1 - 0.65 * wet**1.5 if wet else 9.0,
         "slab_mm": 4000 + np.mod(abs(ground.noise_offset_mm[0]), 2000.0),
+        "box_count": len(members),
         "ground_clear_m": clear_radius_mm(ground, members, props) * MM,
     }
 

@@ -183,7 +183,7 @@ def _steps(plan: GroundPlan, inputs: DrawInputs) -> list[_Step]:
     """
     variant = ShaderVariant(
         layer=inputs.variant.layer,
-        lights=inputs.variant.lights,
+        lights=max(inputs.variant.lights, 1),  # scenes without one share the programs: it is black
         radiance=inputs.variant.radiance,
     )
     steps = []
@@ -192,7 +192,7 @@ def _steps(plan: GroundPlan, inputs: DrawInputs) -> list[_Step]:
         for each in plan.plane:
             shrunk = replace(variant, ground=replace(each.variant, coarse=True))
             steps.append(_Step("ground.frag", shrunk, each.tiles))
-        spread = replace(variant, lights=0, ground=GroundVariant(lens=props.lens, fades=True))
+        spread = replace(variant, lights=0, ground=GroundVariant(lens=props.lens))
         seen = np.logical_or.reduce([each.tiles for each in plan.plane])
         steps.append(_Step("ground_spread.frag", spread, seen))
         props = GroundVariant(boxes=props.boxes, lens=props.lens, props=True, plane=False)
