@@ -108,8 +108,8 @@ def fit_pairs(
 ) -> Classifier:
     """Train a classifier of two classes on pairs of crops.
 
-    A batch has both crops of each pair, varied in the same way, so the network sees no other
-    difference between the classes.
+    A batch has both crops of each pair, varied and mirrored in the same way, so the network sees no
+    other difference between the classes.
 
     Args:
         positive: RGB crops [N, S, S, 3] of class 1.
@@ -129,6 +129,8 @@ def fit_pairs(
         with torch.random.fork_rng(devices=[]):
             ones = _varied(ones)
         crops = torch.cat([ones, _varied(others)])
+        mirrored = torch.rand(count).repeat(2)[:, None, None, None] < 0.5
+        crops = torch.where(mirrored, crops.flip(3), crops)
         return functional.cross_entropy(model(crops), targets, label_smoothing=0.05)
 
     optimize(model, loss, steps)

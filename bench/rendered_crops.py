@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from aimed_cameras import aimed, place_mm
 from numpy.typing import NDArray
-from panel_crops import DAMAGED, Pixels, panels_of, square_crop
+from panel_crops import HANGING, STANDING, Pixels, panels_of, square_crop
 from real_crops import PanelPair
 
 from fastgen import Config, Generator
@@ -53,8 +53,8 @@ _LETTERED = Config.from_values(
 """More markers than the preset, and the sensor effects of the preset `crane` that are not part of a
 scene's surroundings."""
 
-TRAINING = {"markers": _LETTERED, "texts": _LETTERED, "panels": DAMAGED}
-"""Distribution of the scenes by the kind of crop."""
+TRAINING = {"markers": [_LETTERED], "texts": [_LETTERED], "panels": [HANGING, STANDING]}
+"""Distributions of the scenes by the kind of crop, each for an equal share of the scenes."""
 
 _FACES = ("front", "back", "door", "no_door")
 _VIEW_PX = 352
@@ -147,25 +147,34 @@ def in_processes(task: Any, arguments: Sequence[Any], workers: int) -> Iterator[
 
 def _crops_of(seed: int, wanted: tuple[str, ...], scenes: Iterable[int]) -> Crops:
     made = Crops()
+    scenes = list(scenes)
     for kind in wanted:
-        with Generator(TRAINING[kind], seed, (_VIEW_PX, _VIEW_PX)) as generator:
-            for index in scenes:
-                scene = generator.scene(index)
-                rng = stream(seed, index, f"gap.{kind}")
-                if kind == "panels":
-                    made.panels += panels_of(generator, scene, rng)
-                    continue
-                for camera in _cameras(scene, kind, rng):
-                    sample = generator.render(scene=scene, camera=camera)
-                    if kind == "texts":
-                        made.texts += texts_of(sample)
-                    else:
-                        pairs = marker_objects(sample)
-                        made.markers += [
-                            (square_crop(sample.image, box, MARKER_PX), name) for name, box in pairs
-                        ]
-                        made.backgrounds += _backgrounds_of(sample, rng)
+        configs = TRAINING[kind]
+        for part, config in enumerate(configs):
+            own = [index for index in scenes if index % len(configs) == part]
+            with Generator(config, seed, (_VIEW_PX, _VIEW_PX)) as generator:
+                for index in own:
+                    _add_crops(made, kind, generator, index)
     return made
+
+
+def _add_crops(made: Crops, kind: str, generator: Generator, index: int) -> None:
+    """Append the crops of one scene."""
+    scene = generator.scene(index)
+    rng = stream(generator.seed, index, f"gap.{kind}")
+    if kind == "panels":
+        made.panels += panels_of(generator, scene, rng)
+        return
+    for camera in _cameras(scene, kind, rng):
+        sample = generator.render(scene=scene, camera=camera)
+        if kind == "texts":
+            made.texts += texts_of(sample)
+        else:
+            pairs = marker_objects(sample)
+            made.markers += [
+                (square_crop(sample.image, box, MARKER_PX), name) for name, box in pairs
+            ]
+            made.backgrounds += _backgrounds_of(sample, rng)
 
 
 def _cameras(scene: Scene, kind: str, rng: np.random.Generator) -> Iterator[Camera]:

@@ -15,7 +15,7 @@ from crop_statistics import (
     wilson,
 )
 from marker_search import Found, overlap, true_scores
-from panel_crops import DAMAGED, change_of, panels_of, square_crop
+from panel_crops import HANGING, STANDING, change_of, panels_of, square_crop
 from real_crops import load_real
 from text_peer import contains_code, joined
 
@@ -176,11 +176,12 @@ def test_change_of_a_panel_is_that_of_its_most_changed_part():
     assert change_of(spot, panel) == pytest.approx(30, abs=0.5)
 
 
-def test_pairs_of_panels_show_the_same_place_with_and_without_damage():
-    with Generator(DAMAGED, seed=3, size=(160, 160), quality="draft") as generator:
+@pytest.mark.parametrize("config", [HANGING, STANDING], ids=["hanging", "standing"])
+def test_pairs_of_panels_show_the_same_place_with_and_without_damage(config):
+    with Generator(config, seed=3, size=(160, 160), quality="draft") as generator:
         panels = panels_of(generator, generator.scene(0), np.random.default_rng(1))
     assert len(panels) > 2
-    assert {pair.kind for pair in panels} <= set(DAMAGED.damage.kinds)
+    assert {pair.kind for pair in panels} <= set(config.damage.kinds)
     changes = [change_of(pair.damaged, pair.undamaged) for pair in panels]
     others = [change_of(a.damaged, b.undamaged) for a, b in pairwise(panels)]
     assert min(changes) > 0
