@@ -43,12 +43,12 @@ HANGING = Config.from_values(_DAMAGES, base=Config.preset("crane"))
 STANDING = Config.from_values(
     {**_DAMAGES, "placement": {"neighbours": [0, 1]}}, base=Config.preset("gate")
 )
-"""Damaged containers on trailers, with the dark gap below their floor and the ground."""
+"""Damaged containers on trailers. Panels show the ground and the dark gap below the floor."""
 
 _WALLS = Views((-72, 72), (-20, 30), (-8, 8), (1800, 9000))
 _ROOF = Views((-55, 55), (-55, 55), (-8, 8), (1800, 9000))
-"""Damages are photographed from many directions, and whole walls along their length. From 62
-degrees on, half of the sheet is hidden."""
+"""Damages are photographed from many directions, and whole walls along their length. Beyond 62
+degrees, the corrugation hides half of the sheet."""
 
 _MIN_AREA_PX, _MIN_VISIBLE = 60, 0.5
 _MIN_SIDE_PX = 40.0

@@ -212,12 +212,13 @@ def _boxed(folder: Path) -> Iterator[BoxedImage]:
         place = ".".join(str(key) for key in first["loc"])
         raise ConfigError(f"{path}{place and ': '}{place}: {first['msg']}") from None
     if not coco.images:
-        raise ConfigError(f"{path}: images: has none; add your photographs, or remove the file")
+        raise ConfigError(f"{path}: images: is empty; add your photographs, or remove the file")
     known = {each.id for each in coco.images}
     for k, each in enumerate(coco.annotations):
         if each.image_id not in known:
             raise ConfigError(
-                f"{path}: annotations.{k}.image_id: {each.image_id} is no id of images; correct it"
+                f"{path}: annotations.{k}.image_id: no image has the id {each.image_id}; add "
+                "the image or remove the annotation"
             )
     chosen = [each.id for each in coco.categories if each.name == "container"]
     if not chosen:

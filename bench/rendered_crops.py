@@ -152,6 +152,8 @@ def _crops_of(seed: int, wanted: tuple[str, ...], scenes: Iterable[int]) -> Crop
         configs = TRAINING[kind]
         for part, config in enumerate(configs):
             own = [index for index in scenes if index % len(configs) == part]
+            if not own:
+                continue
             with Generator(config, seed, (_VIEW_PX, _VIEW_PX)) as generator:
                 for index in own:
                     _add_crops(made, kind, generator, index)

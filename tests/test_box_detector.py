@@ -69,9 +69,9 @@ def test_boxes_of_containers_are_read_from_a_coco_file(tmp_path):
         ),
         (
             coco(annotations=[{"image_id": 5, "category_id": 2, "bbox": [3, 0, 9, 9]}]),
-            r"annotations\.0\.image_id: 5 is no id of images",
+            r"annotations\.0\.image_id: no image has the id 5",
         ),
-        (coco(images=[], annotations=[]), "images: has none"),
+        (coco(images=[], annotations=[]), "images: is empty"),
     ],
 )
 def test_a_wrong_coco_file_is_refused_by_file_and_place(tmp_path, values, message):

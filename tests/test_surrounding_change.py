@@ -1,4 +1,4 @@
-"""The light of ground and neighbours as the shader reads it, against the light itself."""
+"""Light of ground and neighbours: vertex bytes decoded as in the shader, and the light."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from fastgen.light.surrounding_change import SurroundingLight, lattice
 @pytest.mark.parametrize("added", [0.0, 0.4, 20.0])
 @pytest.mark.parametrize("color", [(1.0, 1.0, 1.0), (0.01, 0.3, 1.0)], ids=["grey", "blue"])
 def test_encoded_light_of_surroundings_is_the_light_itself(color, added):
-    """Also where the open sky has little light in a channel, and where bytes need another scale."""
+    """Cover channels that are dark in the open, and light that needs another common scale."""
     sky = Sky(Ambient.of(prefilter_environment("even", np.full((32, 64, 3), color, "f4"))), 20.0)
     mesh = ShapeLibrary().container("20")
     low, high = mesh.bounds_mm
@@ -42,7 +42,7 @@ def test_encoded_light_of_surroundings_is_the_light_itself(color, added):
     decoded = found[:, 4:7] / 127 * (1 + found[:, 7:8] / 4) * whole
     brightest = (expected / whole).max(axis=1, keepdims=True)
     # the largest ratio is 255 / 127 times the largest scale; brighter light keeps its colour
-    kept = np.minimum(1, 255 / 127 * (1 + 255 / 4) / brightest)
-    step = whole * brightest.clip(1) * kept / 100
-    assert (np.abs(decoded - expected * kept) < step).all()
+    fits = np.minimum(1, 255 / 127 * (1 + 255 / 4) / brightest)
+    step = whole * brightest.clip(1) * fits / 100
+    assert (np.abs(decoded - expected * fits) < step).all()
     assert (found[:, 8:] == (bits & 0xF0)).all()

@@ -177,7 +177,7 @@ def test_a_container_with_a_hole_hides_nothing(generator, scene):
 
 
 def test_scenes_with_other_numbers_of_containers_share_the_programs_of_the_ground(scene):
-    """A program takes up to a second to compile, so they are compiled for few choices."""
+    """A program takes up to 0.7 s to compile, so few variants exist."""
     view, up = view_of(CAMERAS[0], SIZE), np.array([0.0, 0.0, 1.0])
     programs = set()
     for count in range(1, 6):

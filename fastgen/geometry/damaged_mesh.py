@@ -32,13 +32,13 @@ _SPARED = 11
 
 Array = NDArray[np.float64]
 
-Triangles = NDArray[np.intp]
-"""Vertices of triangles or edges."""
+Indices = NDArray[np.intp]
+"""Indices of vertices, edges or corners."""
 
 
 @dataclass(frozen=True, eq=False)
 class DamagedMesh:
-    """Triangles of a damaged container.
+    """Indices of a damaged container.
 
     Attributes:
         positions_mm: float64 [V, 3] in the container frame.
@@ -89,7 +89,7 @@ def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
     )
 
 
-def _within_reach(damage: Damage, vertices: Array, triangles: Triangles) -> NDArray[np.bool_]:
+def _within_reach(damage: Damage, vertices: Array, triangles: Indices) -> NDArray[np.bool_]:
     """Test which triangles a damage may move or tear; bool [T]."""
     local = np.stack(local_coordinates(damage, vertices[:, _REST]), axis=-1)[triangles]
     reach = np.array(reach_mm(damage))
@@ -97,7 +97,7 @@ def _within_reach(damage: Damage, vertices: Array, triangles: Triangles) -> NDAr
     return touches
 
 
-def _refined(vertices: Array, triangles: Triangles, max_edge_mm: float) -> tuple[Array, Triangles]:
+def _refined(vertices: Array, triangles: Indices, max_edge_mm: float) -> tuple[Array, Indices]:
     """Divide triangles into four until no edge at rest is longer than max_edge_mm.
 
     Returns:
@@ -110,7 +110,7 @@ def _refined(vertices: Array, triangles: Triangles, max_edge_mm: float) -> tuple
         long = edges.max(axis=1) > max_edge_mm
         done.append(triangles[~long])
         a, b, c = triangles[long].T
-        ends, middles = _shared(len(vertices), np.stack([a, b, c]), np.stack([b, c, a]))
+        ends, middles = _distinct_edges(len(vertices), np.stack([a, b, c]), np.stack([b, c, a]))
         ab, bc, ca = middles + len(vertices)
         vertices = np.concatenate([vertices, vertices[ends].mean(axis=0)])
         quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
@@ -118,8 +118,8 @@ def _refined(vertices: Array, triangles: Triangles, max_edge_mm: float) -> tuple
     return vertices, np.concatenate([triangles, *done])
 
 
-def _shared(count: int, start: Triangles, end: Triangles) -> tuple[Triangles, Triangles]:
-    """Return each edge once, whatever its direction.
+def _distinct_edges(count: int, start: Indices, end: Indices) -> tuple[Indices, Indices]:
+    """Return the distinct edges, regardless of direction.
 
     Args:
         count: Number of vertices.
@@ -127,19 +127,19 @@ def _shared(count: int, start: Triangles, end: Triangles) -> tuple[Triangles, Tr
         end: Second vertex of each edge [...].
 
     Returns:
-        The lower and the higher vertex of each edge that occurs, [2, E]; and the place of the given
-        edges among them [...].
+        Ends of each distinct edge, lower index first, [2, E]; and the index [...] of each given
+        edge in them.
     """
     keys = np.minimum(start, end) * count + np.maximum(start, end)
     each, places = np.unique(keys, return_inverse=True)
     return np.stack(np.divmod(each, count)), places.reshape(keys.shape)
 
 
-def _cut(hole: Damage, vertices: Array, triangles: Triangles) -> tuple[Array, Triangles]:
+def _cut(hole: Damage, vertices: Array, triangles: Indices) -> tuple[Array, Indices]:
     """Cut a perforation out of small triangles, along straight pieces of its outline.
 
     Returns:
-        The vertices, with the ends of those pieces appended, and the triangles that are left.
+        The vertices, with new ones on the outline appended, and the triangles outside the hole.
     """
     touched, places = np.unique(triangles, return_inverse=True)
     u, v, w = local_coordinates(hole, vertices[touched, _REST])
@@ -152,7 +152,7 @@ def _cut(hole: Damage, vertices: Array, triangles: Triangles) -> tuple[Array, Tr
     # corner a is the only one outside, or the only one within
     a, b, c = _turned(triangles[one], outside[one].argmax(axis=1))
     d, e, f = _turned(triangles[two], (~outside[two]).argmax(axis=1))
-    ends, crossings = _shared(
+    ends, crossings = _distinct_edges(
         len(vertices), np.concatenate([a, a, d, d]), np.concatenate([b, c, e, f])
     )
     low, high = level[np.searchsorted(touched, ends)]
@@ -164,7 +164,7 @@ def _cut(hole: Damage, vertices: Array, triangles: Triangles) -> tuple[Array, Tr
     return np.concatenate([vertices, added]), np.concatenate([triangles[left == 3], *kept])
 
 
-def _turned(triangles: Triangles, first: Triangles) -> Triangles:
+def _turned(triangles: Indices, first: Indices) -> Indices:
     """Return corners a, b and c of triangles, [3, T], rotated so that corner `first` is a."""
     order = (first[:, None] + np.arange(3)) % 3
     return np.take_along_axis(triangles, order, axis=1).T

@@ -101,14 +101,14 @@ class Shapes:
     ) -> LitMesh:
         """Return a container, lit in the open, with its vertex bytes in these surroundings."""
         usual = prepared.usual_spreader
-        visibility = self._probe.container_visibility(below.mesh, usual.mesh if usual else None)
-        open_, light = below.values, below.without_lights
 
-        def found() -> LitMesh:
+        def make() -> LitMesh:
+            visibility = self._probe.container_visibility(below.mesh, usual.mesh if usual else None)
+            open_, light = below.values, below.without_lights
             values = surroundings.applied(visibility, sky, open_, light, below.mesh)
             return replace(below, values=values)
 
-        return self._surrounded.get((below, surroundings), found)
+        return self._surrounded.get((below, surroundings), make)
 
     def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
         """Load the meshes of a scene and all that their light needs; see Renderer.preload."""

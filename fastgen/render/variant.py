@@ -33,8 +33,8 @@ PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")
 class GroundVariant:
     """Choices that a program of the ground is compiled for.
 
-    llvmpipe takes 0.2 to 0.7 s to compile one, so all programs have what costs little where it is
-    not needed.
+    llvmpipe takes 0.2 to 0.7 s to compile a program, so code that costs little when unused is in
+    all of them.
 
     Attributes:
         kind: One of GROUNDS.

@@ -183,7 +183,7 @@ def _steps(plan: GroundPlan, inputs: DrawInputs) -> list[_Step]:
     """
     variant = ShaderVariant(
         layer=inputs.variant.layer,
-        lights=max(inputs.variant.lights, 1),  # scenes without one share the programs: it is black
+        lights=max(inputs.variant.lights, 1),  # with light_count 0, the program skips its light
         radiance=inputs.variant.radiance,
     )
     steps = []
