@@ -207,15 +207,20 @@ def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
     """Return the id target expected from the rays, uint16 [H, W]."""
     ids = np.where(hits.hit, 1, 0).astype(np.uint16)
     ids[hits.spreader] = SPREADER
-    chart = mesh.chart[mesh.triangles[hits.triangle, 0]]
-    outside = hits.hit & (hits.hole < 0)
+    outside = np.flatnonzero(hits.hit & (hits.hole < 0))
+    chart = mesh.chart[mesh.triangles[hits.triangle.ravel()[outside], 0]]
+    atlas_mm = hits.atlas_mm.reshape(-1, 2)
+    seen = {}  # pixels of a face, and their places on its sheet
     following = 2
     for decal in scene.decals:
         if not decal.class_name:
             continue
         number = mesh.chart_index(decal.face)
-        x0, y0 = mesh.charts[number].rect_mm[:2]
-        ids[outside & (chart == number) & inside(decal, hits.atlas_mm - (x0, y0))] = following
+        if number not in seen:
+            pixels = outside[chart == number]
+            seen[number] = pixels, atlas_mm[pixels] - mesh.charts[number].rect_mm[:2]
+        pixels, sheet_mm = seen[number]
+        ids.flat[pixels[inside(decal, sheet_mm)]] = following
         following = 600 if following == 199 else following + 1  # 200 to 599 are damages
     return ids
 

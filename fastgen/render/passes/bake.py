@@ -135,8 +135,17 @@ def bake_atlas(
     # texels outside all parts show only in coarse mip levels
     empty = images[0][..., 3] == 0
     for image in images:
-        image[empty] = np.median(image[~empty], axis=0)
+        median = [_median(channel[~empty]) for channel in np.moveaxis(image, -1, 0)]
+        np.copyto(image, np.array(median, np.uint8), where=empty[..., None])
     return _atlas(images, texel_mm)
+
+
+def _median(values: NDArray[np.uint8]) -> int:
+    """Return the median of bytes, rounded down; counting them is faster than sorting them."""
+    ends = np.cumsum(np.bincount(values, minlength=256))
+    middle = (len(values) - 1) // 2, len(values) // 2
+    low, high = np.searchsorted(ends, middle, side="right")
+    return int(low + high) // 2
 
 
 def bake_ground(
