@@ -5,7 +5,6 @@
 // vec3 ground_lights(vec3 at, vec3 normal, float hidden, float blur_m): irradiance / pi of the
 // directional lights.
 
-#include "ground.constants"
 #include "ground.block"
 #include "variant.constants"
 #include "view.block"

@@ -1,6 +1,5 @@
 // vec3 ground_mirror(vec3 at, vec3 ray, GroundMaterial m): radiance that wet ground mirrors.
 
-#include "ground.constants"
 #include "ground.block"
 #include "environment_map.glsl"
 #include "ground_bodies.glsl"
