@@ -85,7 +85,7 @@ class Shapes:
         """
         mesh, shape, usual = prepared.container, prepared.spreader, prepared.usual_spreader
         sky = _sky_of(prepared, light)
-        below = self._probe.container_light(mesh, None if usual is None else usual.mesh, sky)
+        below = self._probe.container_light(mesh, _spreader_above(prepared), sky)
         if shape is None or usual is None:
             return (below,)
         # a mesh with lens distortion has other vertices, which are probed at their own gap
@@ -100,10 +100,9 @@ class Shapes:
         self, prepared: PreparedScene, below: LitMesh, sky: Sky, surroundings: SurroundingLight
     ) -> LitMesh:
         """Return a container, lit in the open, with its vertex bytes in these surroundings."""
-        usual = prepared.usual_spreader
 
         def make() -> LitMesh:
-            visibility = self._probe.container_visibility(below.mesh, usual.mesh if usual else None)
+            visibility = self._probe.container_visibility(below.mesh, _spreader_above(prepared))
             open_, light = below.values, below.without_lights
             values = surroundings.applied(visibility, sky, open_, light, below.mesh)
             return replace(below, values=values)
@@ -116,7 +115,7 @@ class Shapes:
         usual = prepared.usual_spreader
         if damages:
             _ = container.clusters
-        self._probe.container_visibility(container.mesh, None if usual is None else usual.mesh)
+        self._probe.container_visibility(container.mesh, _spreader_above(prepared))
         if shape is None or usual is None:
             self.zone_table(container, None)
             return
@@ -165,6 +164,12 @@ class Shapes:
         """Free all GL objects."""
         for kept in (self._containers, self._seals, self._spreaders, self._zones, self._probe):
             kept.release()
+
+
+def _spreader_above(prepared: PreparedScene) -> Mesh | None:
+    """Return the spreader at its usual gap, as it hides sky from a container, if there is one."""
+    usual = prepared.usual_spreader
+    return None if usual is None else usual.mesh
 
 
 def _sky_of(prepared: PreparedScene, light: Ambient) -> Sky:
