@@ -9,24 +9,21 @@ from tests.stability.label_table import COUNTS, TABLE, rows
 EDGE_PX = 6
 """Pixels on edges that another CPU or driver may decide otherwise."""
 
-ROUNDED_ROWS = 10
-"""Rows, of 100, in which a CPU may round some coordinate of a label the other way; one did in 5."""
+TOLERANCES = {"object_px": EDGE_PX, "damage_px": EDGE_PX, "places_px": 0.2}
+"""Allowed differences of numbers by column. Labels are rounded to 0.01 pixels, and CPUs may round
+some of them otherwise."""
 
 
 def test_scenes_and_labels_are_those_of_the_table():
     with TABLE.open(newline="", encoding="utf-8") as file:
         stored = list(csv.DictReader(file))
     assert len(stored) == sum(COUNTS.values())
-    advice = "changed; if that is intended, run `python -m tests.stability.label_table`"
-    changed = []
     for row, wanted in zip(rows(), stored, strict=True):
-        place = f"{row['preset']} {row['index']}"
-        for name in ("preset", "index", "camera", "scene"):
-            assert str(row[name]) == wanted[name], f"{place}: {name} {advice}"
-        for name in ("object_px", "damage_px"):
-            assert row[name] == pytest.approx(int(wanted[name]), abs=EDGE_PX), (
-                f"{place}: {name} {advice}"
+        for name, value in row.items():
+            close = wanted[name]
+            if name in TOLERANCES:
+                value, close = float(value), pytest.approx(float(close), abs=TOLERANCES[name])
+            assert (value if name in TOLERANCES else str(value)) == close, (
+                f"{row['preset']} {row['index']}: {name} changed; if that is intended, run "
+                "`python -m tests.stability.label_table`"
             )
-        if row["labels"] != wanted["labels"]:
-            changed.append(place)
-    assert len(changed) <= ROUNDED_ROWS, f"{changed}: labels {advice}"
