@@ -151,6 +151,7 @@ SECTIONS = {
     "damage": Section(
         (
             _damage("axis: a pushed-in edge", "axis", 9, kinked=0.0),
+            _damage("axis: a tilted casting", "axis", 12, kinked_posts=1.0, tilted_castings=1.0),
             _damage("concave: a folded wall", "concave", 1, outward=0.0, buckled=0.0, creased=1.0),
             _damage("concave: buckled ribs", "concave", 1, outward=0.0, buckled=1.0),
             _damage("dented: a fold", "dented", 2, marks={"probability": 0.0}),
@@ -160,8 +161,9 @@ SECTIONS = {
             _damage("rust_through: pits and holes", "rust_through", 3),
             _damage("missing_paint: flaked off", "missing_paint", 9),
             _damage("graffiti: a sprayed tag", "graffiti", 11),
-            _damage("door_gear: a bent bar", "door_gear", 13, missing=0.0, open=0.0),
-            _damage("door_gear: an open handle", "door_gear", 11, missing=0.0, open=1.0),
+            _damage("door_gear: a bent bar", "door_gear", 13, gasket=0, missing=0, open=0),
+            _damage("door_gear: an open handle", "door_gear", 11, gasket=0, missing=0, open=1),
+            _damage("door_gear: a hanging gasket", "door_gear", 3, gasket=1.0),
         )
     ),
     "light": Section(

@@ -100,7 +100,7 @@ __all__ = [
     "grid",
     "to_trimesh",
 ]
-__version__ = "0.39.0"
+__version__ = "0.40.0"
 
 _HOMES = {
     "Config": "config.config",

@@ -2,6 +2,7 @@
 // DamageField missing_bar_field(int i, vec3 q): locking bar that is moved out of sight.
 // DamageMark missing_bar_mark(int i, vec3 q): the part of the door in front of which it was.
 // DamageField open_handle_field(int i, vec3 q): handle that is sheared away from the leaf.
+// DamageField hanging_gasket_field(int i, vec3 q): lip of the gasket that bows out of the door.
 // Twin of fastgen/damages/door_gear.py.
 
 #include "damage.constants"
@@ -50,5 +51,16 @@ DamageField open_handle_field(int i, vec3 q) {
     bool lever = all(lessThan(abs(q), vec3(half_size, HANDLE_HALF_MM.y)));
     float depth = lever ? damage_inward[i].w : 0.0;
     return DamageField(0.5 * depth * (1.0 + q.x / half_size.x), vec3(0.5 * depth / half_size.x, 0.0, 0.0),
+                       0.0);
+}
+
+DamageField hanging_gasket_field(int i, vec3 q) {
+    float apex = damage_shape[3 * i].x;
+    float half_length = damage_along[i].w;
+    float t = q.x / half_length;
+    float part = t < apex ? -1.0 / max(1.0 + apex, 1e-3) : 1.0 / (1.0 - apex);
+    float flank = (t - apex) * part;
+    float depth = length(q.yz) < damage_across[i].w && abs(flank) < 1.0 ? damage_inward[i].w : 0.0;
+    return DamageField(depth * (1.0 - flank * flank), vec3(-2.0 * depth * flank * part / half_length, 0.0, 0.0),
                        0.0);
 }

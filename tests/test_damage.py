@@ -18,7 +18,7 @@ from fastgen.render.settings import QUALITY, Quality
 from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Damage, Scene, Spreader
 from fastgen.scene.container_kinds import KINDS
-from fastgen.scene.locking_bars import BAR_Y_MM
+from fastgen.scene.door_gear import BAR_Y_MM
 from fastgen.scene.object_ids import mask_values
 from tests import oracle
 from tests.random_damages import FORM_NAMES

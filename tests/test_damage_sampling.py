@@ -13,6 +13,7 @@ from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
+from fastgen.geometry.container import build_container
 from fastgen.sampling.damage import sample_damages
 from fastgen.sampling.scene import stream
 from fastgen.sampling.streams import weighted_choice
@@ -286,6 +287,31 @@ def test_bulges_end_at_the_bottom_rail_where_the_configuration_says_so():
         length, width = damage.size_mm
         height = length * abs(damage.along[2]) + width * abs(damage.across[2])
         assert damage.origin_mm[2] - height / 2 == pytest.approx(190, abs=0.2)
+
+
+def test_only_kinks_that_tilt_a_casting_move_one():
+    """A tilted casting leans: its outer plane is straight and ends where the container ends."""
+    values = {"count": [1, 1], "kinds": ["axis"]}
+    for name, damage in damages_of(**values, axis={"tilted_castings": 0.0}):
+        assert not largest_move_of_castings(name, damage)
+    posts = {"kinked": 1.0, "kinked_posts": 1.0, "tilted_castings": 1.0}
+    tilted = damages_of(**values, axis=posts)
+    assert len(tilted) > 100
+    for name, damage in tilted:
+        assert largest_move_of_castings(name, damage) > 15
+        height = KINDS[name].height_mm
+        low = damage.origin_mm[2] < height / 2
+        z = np.linspace(0, 110, 5) if low else height - np.linspace(0, 110, 5)
+        edge = np.column_stack([np.tile(damage.origin_mm[:2], (5, 1)), z])
+        move = damage_law.amount_mm(damage, edge)
+        assert abs(move[0]) < 1
+        np.testing.assert_allclose(move, np.linspace(0, move[-1], 5), atol=0.12 * move[-1])
+
+
+def largest_move_of_castings(name, damage):
+    mesh = build_container(name)
+    charts = [i for i, chart in enumerate(mesh.charts) if chart.name.startswith("casting.")]
+    return damage_law.amount_mm(damage, mesh.positions_mm[np.isin(mesh.chart, charts)]).max()
 
 
 def test_holes_in_the_roof_are_near_its_castings():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from fastgen import Config, Generator
 from fastgen.errors import ConfigError
@@ -12,7 +13,7 @@ from fastgen.geometry.damage_law import amount_mm, deform
 from fastgen.scene import Seal
 from fastgen.scene.check import check_scene
 from fastgen.scene.container_kinds import KINDS
-from fastgen.scene.locking_bars import bar_stations_mm, hasp_mm
+from fastgen.scene.door_gear import bar_stations_mm, hasp_mm
 
 
 def scenes(count, **gear):
@@ -44,7 +45,7 @@ def test_bars_have_vertices_at_their_stations_only(kind):
 def test_a_bent_bar_is_drawn_where_its_field_puts_it():
     """The field is linear between the vertices of the bar, and only bar and brackets move."""
     lengths = set()
-    for scene in scenes(25, missing=0, open=0):
+    for scene in scenes(25, gasket=0, missing=0, open=0):
         mesh, moved = moved_by_chart(scene)
         names = {mesh.charts[chart].name for chart in mesh.chart[moved > 0]}
         bent = {f"door.bar.{bar_at(damage.origin_mm[1])}" for damage in scene.damages}
@@ -68,7 +69,7 @@ def test_a_bent_bar_is_drawn_where_its_field_puts_it():
 def test_a_missing_bar_takes_its_cams_and_handle_along():
     """All of them are behind the leaf; brackets, keepers, the catch and the leaf stay."""
     seen = set()
-    for scene in scenes(12, missing=1):
+    for scene in scenes(12, gasket=0, missing=1):
         mesh, moved = moved_by_chart(scene)
         rest = mesh.positions_mm.astype(np.float64)
         inset = KINDS[scene.container.kind].length_mm / 2 - rest[:, 0]
@@ -91,7 +92,7 @@ def test_a_missing_bar_takes_its_cams_and_handle_along():
 
 
 def test_an_open_handle_swings_about_its_bar():
-    for scene in scenes(12, missing=0, open=1):
+    for scene in scenes(12, gasket=0, missing=0, open=1):
         mesh, moved = moved_by_chart(scene)
         for damage in scene.damages:
             toward = np.array(damage.along)
@@ -106,10 +107,56 @@ def test_an_open_handle_swings_about_its_bar():
         assert moved.max() < 1.0
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_lip_of_the_gasket_is_hidden_until_a_damage_moves_it(kind):
+    """Rays from in front of the door and from beside it, against all triangles but the roof's."""
+    mesh = build_container(kind)
+    ray_triangles = trimesh.Trimesh(mesh.positions_mm, mesh.triangles, process=False)
+    on_lip = mesh.chart == mesh.chart_index("door.lip")
+    targets = mesh.positions_mm[on_lip].astype(np.float64)
+    for direction in ((1.0, 0.0, 0.0), (1.0, 0.6, 0.2), (1.0, -0.6, -0.2), (1.0, 2.0, 0.0)):
+        toward = np.array(direction) / np.linalg.norm(direction)
+        blocked = ray_triangles.ray.intersects_first(
+            targets + 5000.0 * toward, np.tile(-toward, (len(targets), 1))
+        )
+        assert not on_lip[mesh.triangles[blocked, 0]].any()
+
+
+def test_a_hanging_gasket_moves_the_lip_alone_and_hangs_out():
+    free = 0
+    for scene in scenes(20, gasket=1):
+        (damage,) = scene.damages  # there is one lip
+        mesh, moved = moved_by_chart(scene)
+        lip = mesh.chart == mesh.chart_index("door.lip")
+        assert not moved[~lip].any()
+        z = mesh.positions_mm[:, 2]
+        low, high = z[lip].min(), z[lip].max()
+        assert moved[lip].max() > 0.9 * abs(damage.depth_mm)
+        (top,) = set(moved[lip & (z == high)].tolist())
+        assert top == 0.0
+        ends_free = moved[lip & (z == low)].min() > 0.9 * abs(damage.depth_mm)
+        assert ends_free == (damage.shape == (-1.0,))
+        free += ends_free
+        # the farthest point is in front of the leaf, whose face is 58 mm behind the castings
+        farthest = deform(scene.damages, mesh.positions_mm[lip].astype(np.float64))[:, 0].max()
+        assert farthest > KINDS[scene.container.kind].length_mm / 2 - 58.0
+    assert 2 <= free <= 15
+
+
+def test_a_second_hanging_gasket_is_refused():
+    scene = scenes(1, gasket=1)[0]
+    with pytest.raises(ConfigError, match="2 damage the gasket of the door"):
+        check_scene(replace(scene, damages=(*scene.damages, *scene.damages)))
+
+
 def test_a_bar_has_one_damage_and_then_no_seal():
     sealed = 0
     for scene in scenes(60):
         bars = [int(np.searchsorted([-340, 0, 340], d.origin_mm[1])) for d in scene.damages]
+        bars = [
+            "lip" if d.form == "hanging_gasket" else bar
+            for bar, d in zip(bars, scene.damages, strict=True)
+        ]
         assert len(bars) == len(set(bars)) >= 1
         assert not {seal.hasp for seal in scene.seals} & set(bars)
         sealed += len(scene.seals)
@@ -117,7 +164,7 @@ def test_a_bar_has_one_damage_and_then_no_seal():
 
 
 def test_a_scene_with_a_seal_at_a_missing_bar_is_refused():
-    scene = scenes(1, missing=1)[0]
+    scene = scenes(1, gasket=0, missing=1)[0]
     damage = scene.damages[0]
     seal = Seal("bolt", bar_at(damage.origin_mm[1]))
     with pytest.raises(ConfigError, match=f"seals: one is at hasp {seal.hasp}, but .* locking bar"):
@@ -133,7 +180,7 @@ def test_only_the_uncovered_door_counts_for_a_missing_bar():
             "probability": 1,
             "count": [1, 1],
             "kinds": ["door_gear"],
-            "door_gear": {"missing": 1},
+            "door_gear": {"gasket": 0, "missing": 1},
         },
         "spreader": {"probability": 0},
     }

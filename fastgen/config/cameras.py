@@ -155,7 +155,7 @@ def check_room(name: str, rig: CameraConfig, kinds: Iterable[str], bulge_mm: flo
                 bulges = (
                     f" that may bulge by {bulge_mm:g} mm (damage.concave.depth_mm, and "
                     "damage.perforation.depth_mm with a twist above 1; for kind door_gear its "
-                    "depth_mm and swing_mm)"
+                    "depth_mm, swing_mm and gasket_depth_mm)"
                 )
                 less = f"{less} or depth_mm, damage.concave.outward: 0 and a twist up to 1"
             raise ConfigError(

@@ -29,6 +29,18 @@ _KINK_SOFTNESS = Range(0.03, 0.15)
 _KINKS_ABOVE = 0.25
 """Share of the kinks in posts that are just below the upper casting; others are above the lower."""
 
+_CASTING_MM = 118.0
+"""Height of a casting, ISO 1161."""
+
+_TILT_APEX_MM = (20.0, 90.0)
+"""Distance from a tilted casting to the deepest point of its kink."""
+
+_MOST_REACH_MM = 2400.0
+
+_TILT_REACH_MM = 200.0
+"""Additional reach of a kink that tilts a casting: the casting keeps its shape and is not crushed
+along the edge alone."""
+
 
 @dataclass(frozen=True)
 class AxisConfig:
@@ -45,6 +57,7 @@ class AxisConfig:
         kink_depth_mm: Largest displacement of a kink.
         kinked_posts: Probability that a kink is in a corner post, just above its lower casting or
             below its upper one. Other kinks may be in any edge.
+        tilted_castings: Probability that a kink in a post includes its casting and tilts it.
     """
 
     length_mm: Extent = Range(700, 1900)
@@ -55,13 +68,18 @@ class AxisConfig:
     kink_reach_mm: Reach = Range(120, 260)
     kink_depth_mm: Depth = Range(40, 130)
     kinked_posts: Share = 0.5
+    tilted_castings: Share = 0.3
 
 
 def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
-    """Sample a dent of one of the twelve edges, pushed in diagonally and clear of the castings."""
+    """Sample a dent of one of the twelve edges, pushed in diagonally.
+
+    It is clear of the castings, except for kinks that tilt one.
+    """
     half = np.array(size_mm) / 2
     kinked = bool(rng.random() < c.kinked)
     post = kinked and bool(rng.random() < c.kinked_posts)
+    tilted = post and bool(rng.random() < c.tilted_castings)
     axis = 2 if post else int(rng.integers(3))
     others = [i for i in range(3) if i != axis]
     signs = rng.choice([-1.0, 1.0], size=2)
@@ -72,10 +90,15 @@ def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
     along = np.eye(3)[axis]
     room = 2 * half[axis] - 2 * FRAME_MM
     length = draw(rng, c.kink_length_mm if kinked else c.length_mm, room)
+    reach = draw(rng, c.kink_reach_mm if kinked else c.reach_mm)
+    if tilted:
+        length, room = length + _CASTING_MM, 2 * half[axis]
+        reach = min(reach + _TILT_REACH_MM, _MOST_REACH_MM)
     slack = (room - length) / 2
     at = float(rng.uniform(-slack, slack))
+    end = 1.0 if rng.random() < _KINKS_ABOVE else -1.0
     if post:
-        at = slack * (1.0 if rng.random() < _KINKS_ABOVE else -1.0)
+        at = slack * end
     damage = Damage(
         kind="axis",
         face=_edge_name(others, signs),
@@ -83,12 +106,16 @@ def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
         along=rounded_vector(along),
         across=rounded_vector(np.cross(inward, along)),
         inward=rounded_vector(inward),
-        size_mm=(length, 2 * draw(rng, c.kink_reach_mm if kinked else c.reach_mm)),
+        size_mm=(round(length, 2), 2 * reach),
         depth_mm=draw(rng, c.kink_depth_mm if kinked else c.depth_mm),
     )
     if not kinked:
         return damage
-    shape = (draw(rng, _KINK_APEX, digits=3), draw(rng, _KINK_SOFTNESS, digits=4))
+    apex = draw(rng, _KINK_APEX, digits=3)
+    if tilted:
+        deepest_mm = _CASTING_MM + float(rng.uniform(*_TILT_APEX_MM))
+        apex = round(end * max(1 - 2 * deepest_mm / length, -0.9), 3)
+    shape = (apex, draw(rng, _KINK_SOFTNESS, digits=4))
     return replace(damage, form="kinked", shape=shape, **asdict(draw_wear(rng)))
 
 

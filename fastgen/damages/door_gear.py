@@ -1,20 +1,30 @@
-"""Damaged locking gear of the door: bent bars, missing bars and open handles.
+"""Damaged gear of the door: bent bars, missing bars, open handles and hanging gaskets.
 
 A bent bar leans outward from two stations of its mesh to a kink at a third, so the drawn bar has
 exactly the displacement of the field; brackets on this part are pulled out with it. A missing bar
 with its cams and handle is moved behind the leaf, where nothing shows it. An open handle is
-sheared away from the leaf, about its bar. shaders/damage_door_gear.glsl is the GLSL twin.
+sheared away from the leaf, about its bar. A hanging gasket is a lip, hidden between the leaves,
+that bows out of the door. shaders/damage_door_gear.glsl is the GLSL twin.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.damages.draws import Depth, Extent, draw
+from fastgen.damages.draws import Depth, Extent, draw, rounded_vector
 from fastgen.scene import Damage, Vec3
-from fastgen.scene.damage_kinds import Array, Form, Kind, Parameter, half_size, millimetres
-from fastgen.scene.locking_bars import (
+from fastgen.scene.damage_kinds import (
+    LEAST,
+    Array,
+    Form,
+    Kind,
+    Parameter,
+    half_size,
+    millimetres,
+)
+from fastgen.scene.door_gear import (
     BAR_END_MM,
     BAR_INSET_MM,
     BAR_RADIUS_MM,
@@ -22,6 +32,9 @@ from fastgen.scene.locking_bars import (
     CAM_MM,
     HANDLE_INSETS_MM,
     HANDLE_MM,
+    LIP_END_MM,
+    LIP_INSET_MM,
+    LIP_Y_MM,
     bar_stations_mm,
     handle_side,
     hasp_mm,
@@ -54,6 +67,19 @@ _PROUD_MM = 20.0
 
 _HIDDEN_MM = 90.0
 """Displacement of a missing bar. It is then behind the leaf and inside header and sill."""
+
+_AROUND_LIP_MM = 15.0
+"""Distance from the lip's axis within which a hanging gasket acts: the lip ends at 13 mm, and the
+edges of the leaves begin at 18 mm."""
+
+_FREE_ENDS = 0.35
+"""Share of hanging gaskets whose lower end hangs free."""
+
+_GASKET_APEX = (-0.5, 0.1)
+"""Place of a bow's farthest point, in half lengths above its middle: gravity pulls it down."""
+
+_GASKET_TURN_DEG = (10.0, 45.0)
+"""Angle to either side at which a gasket hangs out."""
 
 
 def _bent(damage: Damage, u: Array, v: Array, w: Array) -> Array:
@@ -122,6 +148,17 @@ def _opened_reach(damage: Damage) -> tuple[float, float]:
     return half_length, max(half_width, _LEVER_HALF_MM[1])
 
 
+def _hanging(damage: Damage, u: Array, v: Array, w: Array) -> Array:
+    """A bow of two half parabolas whose common vertex is at `apex` half lengths; a lower end at
+    -1 hangs free."""
+    (apex,) = damage.shape
+    half_length, half_width = half_size(damage)
+    t = u / half_length
+    flank = np.where(t < apex, (apex - t) / max(1 + apex, LEAST), (t - apex) / (1 - apex))
+    on_lip = np.hypot(v, w) < half_width
+    return np.asarray(damage.depth_mm * np.maximum(1 - flank * flank, 0.0) * on_lip)
+
+
 _SHADER = "damage_door_gear.glsl"
 
 _FORMS = (
@@ -165,31 +202,48 @@ _FORMS = (
         along_edge=True,
         constants={"HANDLE_HALF_MM": "vec2({}, {})".format(*_LEVER_HALF_MM)},
     ),
+    Form(
+        name="hanging_gasket",
+        glsl="hanging_gasket",
+        shader=_SHADER,
+        amount=_hanging,
+        along_edge=True,
+        parameters=(Parameter("place of the farthest point, in half lengths", -1.0, 0.9),),
+    ),
 )
 
 
 @dataclass(frozen=True)
 class DoorGearConfig:
-    """Locking bar of the door that is bent or missing, or whose handle is open.
+    """Locking bar that is bent or missing or has an open handle, or a gasket that hangs out.
 
     Attributes:
+        gasket: Probability that a part of the gasket hangs out from between the leaves. Otherwise a
+            locking bar is damaged.
         missing: Probability that the bar is missing, with its cams and handle.
         open: Probability that the handle of another bar is open. Otherwise the bar is bent outward.
         length_mm: Length of a bend, rounded to whole pieces of about 280 mm.
         depth_mm: Outward displacement of a bent bar.
         swing_mm: Outward displacement of the end of an open handle.
+        gasket_length_mm: Length of a gasket's part that hangs out.
+        gasket_depth_mm: Largest distance of a hanging gasket from its groove.
     """
 
+    gasket: Share = 0.2
     missing: Share = 0.3
     open: Share = 0.35
     length_mm: Extent = Range(500, 1150)
     depth_mm: Depth = Range(30, 150)
     swing_mm: Depth = Range(60, 180)
+    gasket_length_mm: Extent = Range(350, 1100)
+    gasket_depth_mm: Depth = Range(80, 220)
 
 
 def _place(c: DoorGearConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
-    """Sample the damage of one bar; its place follows from those of bar and handle."""
+    """Sample the damage of one part; its place follows from those of bar, handle and lip."""
     length, _, height = size_mm
+    if rng.random() < c.gasket:
+        return _hanging_gasket(c, length, height, rng)
     bar = int(rng.integers(len(BAR_Y_MM)))
     x, y, side = length / 2 - BAR_INSET_MM, BAR_Y_MM[bar], handle_side(bar)
     up, toward, inward = (0.0, 0.0, 1.0), (0.0, side, 0.0), (-1.0, 0.0, 0.0)
@@ -215,6 +269,31 @@ def _place(c: DoorGearConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage
     )  # fmt: skip
 
 
+def _hanging_gasket(
+    c: DoorGearConfig, length_mm: float, height_mm: float, rng: np.random.Generator
+) -> Damage:
+    """Sample a bow of the lip, to either side and outward, or its free lower end."""
+    low, high = LIP_END_MM, height_mm - LIP_END_MM
+    extent = draw(rng, c.gasket_length_mm, high - low)
+    free = rng.random() < _FREE_ENDS
+    start = low if free else float(rng.uniform(low, high - extent))
+    apex = -1.0 if free else round(float(rng.uniform(*_GASKET_APEX)), 3)
+    aside = math.radians(float(rng.uniform(*_GASKET_TURN_DEG)) * rng.choice((-1.0, 1.0)))
+    inward = (-math.cos(aside), math.sin(aside), 0.0)
+    return Damage(
+        "door_gear",
+        "door",
+        (length_mm / 2 - LIP_INSET_MM, LIP_Y_MM, round(start + extent / 2, 2)),
+        (0.0, 0.0, 1.0),
+        rounded_vector(np.cross(inward, (0.0, 0.0, 1.0))),
+        rounded_vector(np.array(inward)),
+        (extent, 2 * _AROUND_LIP_MM),
+        -draw(rng, c.gasket_depth_mm),
+        (apex,),
+        "hanging_gasket",
+    )
+
+
 def _bend_mm(
     length_mm: float, height_mm: float, handle_z: float, rng: np.random.Generator
 ) -> tuple[float, float, float]:
@@ -233,7 +312,7 @@ def _bend_mm(
 
 
 def _bulge_mm(c: DoorGearConfig) -> float:
-    return max(c.depth_mm.hi, c.swing_mm.hi)
+    return max(c.depth_mm.hi, c.swing_mm.hi, c.gasket_depth_mm.hi)
 
 
 KIND = Kind("door_gear", _FORMS, DoorGearConfig, place=_place, bulge_mm=_bulge_mm, on_gear=True)

@@ -1,4 +1,4 @@
-"""Locking gear and hinges of the door end.
+"""Locking gear and hinges of the door end, and the lip of the gasket between its leaves.
 
 At 10 m, a 45 mm lens and a 36 mm sensor of 640 pixels resolve 12.5 mm. A locking bar of 34 mm is
 under 3 pixels wide, so eight sides are round enough; hinge knuckles of 28 mm get six.
@@ -11,14 +11,18 @@ from fastgen.geometry.container_parts import DOOR_FACE_MM
 from fastgen.geometry.door import LEAF_MM, SWAGE, Opening, opening
 from fastgen.geometry.mesh import Chart
 from fastgen.geometry.unfold import Patch, Sheet, beside, box, breaks, prism, regular
-from fastgen.scene.locking_bars import (
+from fastgen.scene.door_gear import (
     BAR_END_MM,
     BAR_INSET_MM,
     BAR_RADIUS_MM,
     BAR_Y_MM,
     CAM_MM,
     HANDLE_INSETS_MM,
+    LIP_HALF_MM,
+    LIP_INSET_MM,
+    LIP_Y_MM,
     hasp_mm,
+    lip_stations_mm,
 )
 
 _BACK_MM = LEAF_MM + SWAGE.depth_mm + 4.0
@@ -61,6 +65,16 @@ def gear(layout: Layout) -> list[Sheet]:
         patches = _hinges(place, sign)
         sheets.append(Sheet(f"door.hinges.{name}", "door", "paint_frame", "door", beside(patches)))
     return sheets
+
+
+def gasket_lip(layout: Layout) -> Sheet:
+    """Return the lip, out of sight behind the gasket until a damage moves it; see
+    damages/door_gear.py."""
+    middle = opening(layout).x - LIP_INSET_MM, LIP_Y_MM
+    # unfolded from its back
+    outline = middle + np.array([(-1, 1), (-1, -1), (1, -1), (1, 1)]) * LIP_HALF_MM
+    lip = prism(outline, lip_stations_mm(layout.top), 2, capped=(True, False))
+    return Sheet("door.lip", "door", "rubber", "door", lip, last=True)
 
 
 def _block(

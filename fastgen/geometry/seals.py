@@ -20,8 +20,8 @@ from fastgen.geometry.mesh import Chart, Mesh, Zone
 from fastgen.geometry.unfold import Patch, beside, prism, regular
 from fastgen.scene import Damage, Scene, Seal
 from fastgen.scene.container_kinds import KINDS
+from fastgen.scene.door_gear import hasp_mm
 from fastgen.scene.limits import HASPS
-from fastgen.scene.locking_bars import hasp_mm
 
 Array = NDArray[np.float64]
 Points = Sequence[tuple[float, float, float]]

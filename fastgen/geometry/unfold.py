@@ -70,6 +70,7 @@ class Sheet:
         group: Face group of its triangles, or "frame". The outermost facets of "frame" go to the
             group of their face, see Mesh.groups.
         patch: Its triangles.
+        last: Whether it is packed after all others, in the room that they leave in the atlas.
     """
 
     name: str
@@ -77,6 +78,7 @@ class Sheet:
     material: str
     group: str
     patch: Patch
+    last: bool = False
 
 
 def breaks(low: float, high: float, step: float, extra: Iterable[float] = ()) -> Array:
@@ -269,7 +271,9 @@ def assemble(
         A mesh whose triangles are sorted by group.
     """
     assert all(s.material in MATERIALS and s.face in FACES for s in sheets)
-    packing = _packed(np.array([s.patch.size_mm for s in sheets]))
+    packing = _packed(
+        np.array([s.patch.size_mm for s in sheets]), np.array([s.last for s in sheets])
+    )
     patches = [
         (s.patch.turned() if turned else s.patch).at(x, y)
         for s, turned, (x, y) in zip(sheets, packing.turned, packing.corners, strict=True)
@@ -353,16 +357,23 @@ class _Packing:
     size: tuple[float, float]
 
 
-def _packed(sizes: Array) -> _Packing:
-    """Return places for boxes [N, 2]; the atlas has the shortest longer side of several widths."""
+def _packed(sizes: Array, last: NDArray[np.bool_]) -> _Packing:
+    """Return places for boxes [N, 2]; the atlas has the shortest longer side of several widths.
+
+    Boxes of `last` bool [N] are placed after the others and do not change their places.
+    """
     padded = np.ceil(sizes + GUTTER_MM)
-    widest = float(padded.max())
-    tries = [_shelves(padded, width) for width in np.linspace(widest, 2 * widest, 31)]
-    best = min(tries, key=lambda packing: max(packing.size))
-    return replace(best, corners=best.corners + GUTTER_MM / 2)
+    first = padded[~last]
+    widest = float(first.max())
+    width = min(
+        np.linspace(widest, 2 * widest, 31).tolist(),
+        key=lambda width: max(_shelves(first, last[~last], width).size),
+    )
+    packing = _shelves(padded, last, width)
+    return replace(packing, corners=packing.corners + GUTTER_MM / 2)
 
 
-def _shelves(padded: Array, limit: float) -> _Packing:
+def _shelves(padded: Array, last: NDArray[np.bool_], limit: float) -> _Packing:
     """Place boxes on shelves no wider than `limit`.
 
     First-fit decreasing height (Coffman, Garey, Johnson and Tarjan 1980), except that a long part
@@ -370,22 +381,25 @@ def _shelves(padded: Array, limit: float) -> _Packing:
     """
     corners = np.empty_like(padded)
     turned = np.zeros(len(padded), bool)
-    waiting = [(-height, -width, i) for i, (width, height) in enumerate(padded.tolist())]
+    waiting = [
+        (late, -height, -width, i)
+        for i, (late, width, height) in enumerate(np.column_stack([last, padded]).tolist())
+    ]
     heapify(waiting)
     shelves: list[list[float]] = []
     top = 0.0
     while waiting:
-        height, width, i = heappop(waiting)
+        late, height, width, i = heappop(waiting)
         height, width = -height, -width
-        shelf = next((s for s in shelves if s[0] + width <= limit), None)
+        shelf = next((s for s in shelves if s[0] + width <= limit and height <= s[2]), None)
         if shelf is None and height > 2 * width and not turned[i]:
             turned[i] = True
-            heappush(waiting, (-width, -height, i))
+            heappush(waiting, (late, -width, -height, i))
             continue
         if shelf is None:
-            shelf = [0.0, top]
+            shelf = [0.0, top, height]
             shelves.append(shelf)
             top += height
-        corners[i] = shelf
+        corners[i] = shelf[:2]
         shelf[0] += width
     return _Packing(corners, turned, (max(shelf[0] for shelf in shelves), top))

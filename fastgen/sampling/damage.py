@@ -14,8 +14,8 @@ from fastgen.sampling.sight import LEAST_SHARE
 from fastgen.sampling.streams import Streams, one_of
 from fastgen.scene import Damage, Vec3
 from fastgen.scene.damage_kinds import Kind, SheetForm, kind_named
+from fastgen.scene.door_gear import damaged_gear
 from fastgen.scene.limits import MAX_INSTANCES
-from fastgen.scene.locking_bars import damaged_bars
 
 _CASTING_MM = 350.0
 """Distance from the frame within which the rim of a hole near a casting ends."""
@@ -66,7 +66,7 @@ def sample_damages(
 
     Returns:
         Damages in the container frame, those of listed_kinds first; an empty tuple for an
-        undamaged container. Damages of a locking bar that has one already are left out.
+        undamaged container. Damages of door gear that has one already are left out.
     """
     kinds = listed_kinds(config, streams)
     planes = _planes(size_mm)
@@ -77,8 +77,8 @@ def sample_damages(
         aimed = streams(f"damage.{i}.toward").random() < config.toward_cameras
         draw = partial(_drawn, kind, config, size_mm, planes, rng)
         damage = _best_seen(draw, share) if aimed else draw()
-        bars = damaged_bars((*damages, damage))
-        if len(bars) > len(set(bars)):
+        gear = damaged_gear((*damages, damage))
+        if len(gear) > len(set(gear)):
             continue
         damages.append(damage)
         if kind.draw is None:

@@ -8,7 +8,7 @@ from fastgen.config.config import SealsConfig
 from fastgen.config.fields import linear_color
 from fastgen.sampling.streams import Streams, one_of, weighted_choice
 from fastgen.scene import Damage, Seal
-from fastgen.scene.locking_bars import damaged_bars
+from fastgen.scene.door_gear import damaged_gear
 
 _HASP_WEIGHTS = (1.0, 1.0, 3.0, 3.0)
 """Relative frequency of each hasp. The right leaf opens first, so seals are mostly on it."""
@@ -24,7 +24,7 @@ def sample_seals(
         damages: Damages of the container.
         streams: Returns the random generator of a property by its name.
     """
-    rng, damaged = streams("seals"), damaged_bars(damages)
+    rng, damaged = streams("seals"), damaged_gear(damages)
     if rng.random() >= config.probability:
         return ()
     count = 1 + int(rng.random() < config.second)

@@ -13,6 +13,7 @@ from fastgen.errors import ConfigError, shown
 from fastgen.scene import Camera, Damage, Decal, Neighbour, Scene
 from fastgen.scene.boxes import away_mm, prop_box
 from fastgen.scene.damage_kinds import form_of, kind_named
+from fastgen.scene.door_gear import LIP, damaged_gear
 from fastgen.scene.limits import (
     CAMERA_REACH_MM,
     COMPUTED_ART,
@@ -21,7 +22,6 @@ from fastgen.scene.limits import (
     MM,
     NEAR_M,
 )
-from fastgen.scene.locking_bars import damaged_bars
 from fastgen.scene.places import check_places, container_boxes, container_names
 from fastgen.validation import check_fields, check_known
 
@@ -119,11 +119,12 @@ def _check_contents(carrier: Scene | Neighbour, path: str, own: OwnDecals) -> No
     for i, damage in enumerate(carrier.damages):
         _check_damage(damage, f"{path}.damages[{i}]")
     sealed = {seal.hasp for seal in carrier.seals}
-    for bar, count in Counter(damaged_bars(carrier.damages)).items():
+    for bar, count in Counter(damaged_gear(carrier.damages)).items():
         if count > 1:
+            part = "gasket of the door" if bar == LIP else f"door gear of locking bar {bar}"
             raise ConfigError(
-                f"{path}.damages: {count} damage the door gear of locking bar {bar}, and a bar has "
-                "at most one such damage; remove some"
+                f"{path}.damages: {count} damage the {part}, which has at most one such damage; "
+                "remove some"
             )
         if bar in sealed:
             raise ConfigError(

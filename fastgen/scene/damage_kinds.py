@@ -188,8 +188,9 @@ class Kind:
         bulge_mm: Function of `ranges` to the largest outward displacement in mm.
         leaks: Whether rust may run down below it.
         rubbed: Whether it may have a scrape beside it.
-        on_gear: Whether it damages the locking bar of the door that is nearest to its origin. A bar
-            has at most one such damage, and then no seal.
+        on_gear: Whether it damages door gear: the locking bar, or the gasket between the leaves,
+            that is nearest to its origin. Each has at most one such damage, and a damaged bar has
+            no seal.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Places of the locking bars on the door end and of the handles that turn them.
+"""Places of door gear: locking bars, the handles that turn them, and the gasket's lip.
 
 Bars are numbered from left to right as seen from outside. Insets are distances in mm inward from
 the castings' plane.
@@ -35,12 +35,38 @@ HANDLE_MM = 300.0
 HANDLE_INSETS_MM = (22.0, 34.0)
 """Insets of a handle's front and back."""
 
+LIP_Y_MM = 0.0
+"""Position of the lip: the part of the gasket between the leaves that may hang out of the door."""
+
+LIP_INSET_MM = 94.0
+"""Inset of the lip's axis. There the gasket and the edges of the leaves hide the lip."""
+
+LIP_HALF_MM = (5.0, 12.0)
+"""Half extents of the lip's section along x and y."""
+
+LIP_END_MM = 150.0
+"""Distance of the lip's ends from the castings' top and bottom planes."""
+
+LIP_PIECE_MM = 80.0
+"""Longest piece of the lip between two stations, where it can bend."""
+
+LIP = len(BAR_Y_MM)
+"""Number of the lip among door gear, after the bars."""
+
 
 def bar_stations_mm(height_mm: float) -> NDArray[np.float64]:
     """Return the ascending z of the stations of the bars of a container of a height."""
-    length_mm = height_mm - 2 * BAR_END_MM
-    pieces = int(np.ceil(length_mm / BAR_PIECE_MM))
-    return np.linspace(BAR_END_MM, height_mm - BAR_END_MM, pieces + 1)
+    return _stations_mm(height_mm, BAR_END_MM, BAR_PIECE_MM)
+
+
+def lip_stations_mm(height_mm: float) -> NDArray[np.float64]:
+    """Return the ascending z of the stations of the gasket's lip of a container of a height."""
+    return _stations_mm(height_mm, LIP_END_MM, LIP_PIECE_MM)
+
+
+def _stations_mm(height_mm: float, end_mm: float, piece_mm: float) -> NDArray[np.float64]:
+    pieces = int(np.ceil((height_mm - 2 * end_mm) / piece_mm))
+    return np.linspace(end_mm, height_mm - end_mm, pieces + 1)
 
 
 def handle_side(bar: int) -> float:
@@ -61,13 +87,11 @@ def hasp_mm(bar: int) -> tuple[float, float]:
     return y + handle_side(bar) * HANDLE_MM, 1120.0 if abs(y) > 300 else 980.0
 
 
-def damaged_bar(damage: Damage) -> int | None:
-    """Return the number of the locking bar that a damage changes, None for other damages."""
-    if not kind_named(damage.kind).on_gear:
-        return None
-    return int(np.abs(np.subtract(BAR_Y_MM, damage.origin_mm[1])).argmin())
-
-
-def damaged_bars(damages: Iterable[Damage]) -> list[int]:
-    """Return the numbers of the locking bars that damages change, one for each such damage."""
-    return [bar for bar in map(damaged_bar, damages) if bar is not None]
+def damaged_gear(damages: Iterable[Damage]) -> list[int]:
+    """Return the number of the bar that each damage of door gear changes, or LIP."""
+    places = [*BAR_Y_MM, LIP_Y_MM]
+    return [
+        int(np.abs(np.subtract(places, damage.origin_mm[1])).argmin())
+        for damage in damages
+        if kind_named(damage.kind).on_gear
+    ]
