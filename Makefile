@@ -69,8 +69,10 @@ lint: setup
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 
+# a worker that dies ends the run: pytest-xdist would hand its finished files to the next one, and
+# wait forever for their tests
 test: glslang chromium lint
-	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart=0
 
 docs: setup
 	$(BIN)/mkdocs build
