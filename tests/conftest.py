@@ -15,7 +15,6 @@ OPEN_GENERATORS = 4
 """Generators that are kept open; each holds a GL context and its textures."""
 
 LONGEST = (
-    "test_ray.py",
     "test_damage_sampling.py",
     "test_hostile_paths.py",
     "test_config.py",
