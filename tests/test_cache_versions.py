@@ -25,8 +25,8 @@ TABLE = {
     "noise": (noise, 1, 16.23007, 52.29057, 44.10587),
     "rust-points": (rust, 1, 8.83054, 14.70023, 12.84564),
     "sheet": (chart_sheet, 1, 12.78655, 221.11837, 198.38758),
-    "sky-directions": (sky_visibility_probe, 1, 13.55746, 19.84805, 17.15882),
-    "sky-visibility": (sky_visibility_probe, 1, 13.18226, 58.21188, 51.2073),
+    "sky-directions": (sky_visibility_probe, 2, 13.56723, 19.84014, 17.14778),
+    "sky-visibility": (sky_visibility_probe, 2, 13.18226, 58.21188, 51.2073),
     "spreader": (spreader, 5, 11.03602, 33.203, 30.26422),
     "triangle-bounds": (mesh, 1, 11.93882, 14.59168, 13.22793),
 }
@@ -83,7 +83,7 @@ def summaries(tmp_path_factory):
         sky = Sky(ambient, 0.0)
         with open_context() as gl:
             probe = sky_visibility_probe.SkyVisibilityProbe(gl.ctx)
-            below = probe.container_light(body, held, sky)
+            below = probe.container_light(body, body, held, sky)
             paints = ((0.5, 0.5, 0.5),) * len(mesh.MATERIALS)
             probe.spreader_light(held, held, body, below, sky, paints)
             probe.release()

@@ -222,7 +222,7 @@ def lit(world, tmp_path_factory):
             )
             used = {"paint_sheet": roof, **{chart.material: beam for chart in spreader.charts}}
             paints = tuple(tuple(used.get(material, 50 * ROOF)) for material in MATERIALS)
-            below = below or probe.container_light(container, spreader, sky)
+            below = below or probe.container_light(container, held, spreader, sky)
             return probe.spreader_light(spreader, outline, held, below, sky, paints)
 
         yield found

@@ -9,7 +9,7 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import Config
 from fastgen.classes import SPREADER_ID
-from fastgen.geometry.container import build_container
+from fastgen.geometry.container import build_container, container_outline
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
 from fastgen.light.directional_lights import DirectionalLight
@@ -253,7 +253,8 @@ def test_sky_visibility_equals_ray_casts(gl, even_sky, kind, held):
     container = build_container(kind)
     spreader = build_spreader(kind) if held else None
     probe = SkyVisibilityProbe(gl.ctx)
-    found = probe.container_light(container, spreader, even_sky).values
+    outline = container_outline(kind)
+    found = probe.container_light(container, outline, spreader, even_sky).values
     share = found[:, 4] / 127
     probe.release()
     sheets = [i for i, c in enumerate(container.charts) if c.face != "underside"]
@@ -275,9 +276,9 @@ def test_sky_visibility_equals_ray_casts(gl, even_sky, kind, held):
 
 def test_no_vertex_sees_the_sky_through_the_container(gl, even_sky):
     """Creases are at risk: there a depth map holds only a thin sheet of the wall."""
-    container = build_container("20")
+    container, outline = build_container("20"), container_outline("20")
     probe = SkyVisibilityProbe(gl.ctx)
-    bits = probe.container_light(container, None, even_sky).values[:, 8:]
+    bits = probe.container_light(container, outline, None, even_sky).values[:, 8:]
     probe.release()
     open_to = np.unpackbits(bits, axis=1).astype(bool)
     points = probe_points(container)
@@ -306,25 +307,25 @@ def test_lobe_masks_contain_the_nearest_directions_and_the_hemisphere():
 
 
 def test_the_disk_cache_returns_the_computed_values(gl, even_sky, monkeypatch):
-    container, spreader = build_container("20"), build_spreader("20")
-    first = SkyVisibilityProbe(gl.ctx).container_light(container, spreader, even_sky).values
+    meshes = build_container("20"), container_outline("20"), build_spreader("20")
+    first = SkyVisibilityProbe(gl.ctx).container_light(*meshes, even_sky).values
 
     def never(*_: object) -> None:
         raise AssertionError("cached sky visibility was computed again")
 
     monkeypatch.setattr(SkyVisibilityProbe, "_visible", never)
-    again = SkyVisibilityProbe(gl.ctx).container_light(container, spreader, even_sky).values
+    again = SkyVisibilityProbe(gl.ctx).container_light(*meshes, even_sky).values
     np.testing.assert_array_equal(again, first)
 
 
 @needs_osmesa
 def test_backends_compute_the_same_sky_visibility(even_sky):
-    container = build_container("20")
+    meshes = build_container("20"), container_outline("20"), None
     found = []
     for backend in ("egl", "osmesa"):
         with open_context(backend) as context:
             probe = SkyVisibilityProbe(context.ctx)
-            found.append(probe.container_light(container, None, even_sky).values)
+            found.append(probe.container_light(*meshes, even_sky).values)
     np.testing.assert_array_equal(*found)
 
 

@@ -21,8 +21,8 @@ from fastgen.scene.damage_kinds import Kind, SheetForm
 from fastgen.validation import UNIT, Bounds, Range, Share
 
 _RIBS_SOFTNESS_MM = Range(1.0, 14.0)
-"""Length over which the edge of a rib mark is rounded: small where a hard edge cut in, large where a
-rounded object bent the sheet."""
+"""Length over which the edge of a rib mark is rounded: small where a hard edge cut in, large where
+a rounded object bent the sheet."""
 
 _RIBS_RAMP_MM, _RIBS_RAMP = 60.0, 1 / 3
 """Length over which a row of rib marks runs out, and its largest share of the row."""

@@ -129,7 +129,8 @@ class PreparedScene:
 
     @cached_property
     def container_outline(self) -> Mesh:
-        """The container at rest with as few triangles as possible, for shadows."""
+        """The container at rest with as few triangles as possible, for shadows and sky
+        visibility."""
         box = self.scene.container
         return self._shapes.container_outline(box.kind, box.profiles)
 

@@ -36,9 +36,6 @@ _OFF_PLANE = 20.0
 """Weight of a vertex's distance from the plane of a hit, relative to distance along the plane. The
 two sides of a plate, or two plates, may be as close as the vertices of one face."""
 
-_NEAREST = 24
-"""Number of candidate vertices for a hit."""
-
 _LEAST_KNOWN = 0.25
 """Least known share of a hemisphere by which the known part is scaled up."""
 
@@ -209,57 +206,66 @@ def _found(
     spreader: Mesh, body: Body, box: Array, points: Array, toward: Array, hidden: NDArray[np.bool_]
 ) -> dict[str, NDArray[np.int32]]:
     """Return receivers, direction indices and emitters, int32 [3, K], for each kind of emitter."""
-    from scipy.spatial import cKDTree  # imported late: takes 0.3 s
-
-    tree = cKDTree(_with_normals(spreader.positions_mm, spreader.normals))
     corners = body.positions_mm[body.triangles].astype(np.float64)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     corners, normals = corners[size[:, 0] > 0], (normals / np.maximum(size, 1e-9))[size[:, 0] > 0]
     facing = spreader.normals @ toward.T > 0
-    rows: dict[str, list[NDArray[np.int32]]] = {"own": [], "below": []}
+    own: list[NDArray[np.int32]] = []
+    below: list[NDArray[np.int32]] = []
+    places: list[Array] = []
     for number, ray in enumerate(toward):
         receiver = np.flatnonzero(hidden[:, number] & facing[:, number])
         start = points[receiver]
-        before = normals @ ray < -1e-3  # a face turned away is the inside of a body
+        # a face turned away is the inside of a body
+        before = np.flatnonzero(normals @ ray < -1e-3)
         hit, own_mm = _first_hits(start, ray, corners[before])
         side, box_mm = _entered(start, ray, box)
         on_box = box_mm < own_mm
         on_own = ~on_box & np.isfinite(own_mm)
-        met = start[on_own] + own_mm[on_own, None] * ray
-        normal = normals[before][hit[on_own]]
-        _, near = tree.query(_with_normals(met, normal), k=_NEAREST)
-        emitter = _representative(met, normal, near, spreader)
-        rows["own"].append(_rows(receiver[on_own], number, emitter))
+        own.append(_rows(receiver[on_own], number, before[hit[on_own]]))
+        places.append(start[on_own] + own_mm[on_own, None] * ray)
         met = start[on_box] + box_mm[on_box, None] * ray
-        rows["below"].append(_rows(receiver[on_box], number, cell_of(side[on_box], met, box)))
-    return {name: np.concatenate(found, axis=1) for name, found in rows.items()}
+        below.append(_rows(receiver[on_box], number, cell_of(side[on_box], met, box)))
+    found = np.concatenate(own, axis=1)
+    found[2] = _representatives(np.concatenate(places), normals, found[2], spreader)
+    return {"own": found, "below": np.concatenate(below, axis=1)}
 
 
-def _representative(met: Array, normal: Array, near: Numbers, spreader: Mesh) -> Numbers:
+def _representatives(met: Array, normals: Array, triangle: Numbers, spreader: Mesh) -> Numbers:
     """Return the vertex [K] that represents each hit.
+
+    Among hits with one normal, a vertex is compared by a Euclidean distance in a space that has the
+    distance from their planes as one more axis. A tree in that space finds the nearest one.
 
     Args:
         met: Positions of the hits, [K, 3].
-        normal: Normals of the hit surfaces, [K, 3].
-        near: Candidate vertices, [K, N].
+        normals: Normals of all triangles, [T, 3].
+        triangle: Triangle of each hit, [K].
         spreader: Mesh of the vertices.
     """
-    apart = _with_normals(met, normal)[:, None] - _with_normals(
-        spreader.positions_mm[near], spreader.normals[near]
-    )
-    off = _OFF_PLANE * (apart[..., :3] * normal[:, None]).sum(axis=-1)
-    best = ((apart**2).sum(axis=-1) + off**2).argmin(axis=1)
-    chosen: Numbers = near[np.arange(len(near)), best]
-    return chosen
+    from scipy.spatial import cKDTree  # imported late: takes 0.3 s
+
+    distinct, number = np.unique(normals.round(6), axis=0, return_inverse=True)
+    number = number[triangle]
+    found = np.empty(len(met), np.int64)
+    for i, normal in enumerate(distinct):
+        rows = np.flatnonzero(number == i)
+        if len(rows):
+            tree = cKDTree(_embedded(spreader.positions_mm, spreader.normals, normal))
+            same = np.broadcast_to(normal, (len(rows), 3))
+            found[rows] = tree.query(_embedded(met[rows], same, normal))[1]
+    return found
+
+
+def _embedded(positions_mm: Array, normals: Array, plane: Array) -> Array:
+    """Return points [N, 7] in the space of `_representatives` for planes with a normal."""
+    off = _OFF_PLANE * (positions_mm @ plane)[:, None]
+    return np.concatenate([positions_mm, _TURNED_MM / 2**0.5 * normals, off], axis=-1)
 
 
 def _rows(receiver: Numbers, ray: int, emitter: Numbers) -> NDArray[np.int32]:
     return np.stack([receiver, np.full(len(receiver), ray), emitter]).astype(np.int32)
-
-
-def _with_normals(positions_mm: Array, normals: Array) -> Array:
-    return np.concatenate([positions_mm, _TURNED_MM / 2**0.5 * normals], axis=-1)
 
 
 def _first_hits(start: Array, ray: Array, corners: Array) -> tuple[NDArray[np.intp], Array]:

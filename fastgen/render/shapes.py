@@ -11,7 +11,7 @@ from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.seals import nearest_gear, seal_charts
 from fastgen.light.environment import Ambient
-from fastgen.light.sky_visibility import Sky
+from fastgen.light.sky_visibility import Sky, SkyVisibility
 from fastgen.light.surrounding_change import SurroundingLight
 from fastgen.render.gpu_mesh import GpuMesh, zone_rows, zone_table
 from fastgen.render.recent_cache import RecentCache, ReleasingCache
@@ -85,7 +85,9 @@ class Shapes:
         """
         mesh, shape, usual = prepared.container, prepared.spreader, prepared.usual_spreader
         sky = _sky_of(prepared, light)
-        below = self._probe.container_light(mesh, _spreader_above(prepared), sky)
+        below = self._probe.container_light(
+            mesh, prepared.container_outline, _spreader_above(prepared), sky
+        )
         if shape is None or usual is None:
             return (below,)
         # a mesh with lens distortion has other vertices, which are probed at their own gap
@@ -102,12 +104,17 @@ class Shapes:
         """Return a container, lit in the open, with its vertex bytes in these surroundings."""
 
         def make() -> LitMesh:
-            visibility = self._probe.container_visibility(below.mesh, _spreader_above(prepared))
+            visibility = self._visibility(below.mesh, prepared)
             open_, light = below.values, below.without_lights
             values = surroundings.applied(visibility, sky, open_, light, below.mesh)
             return replace(below, values=values)
 
         return self._surrounded.get((below, surroundings), make)
+
+    def _visibility(self, mesh: Mesh, prepared: PreparedScene) -> SkyVisibility:
+        return self._probe.container_visibility(
+            mesh, prepared.container_outline, _spreader_above(prepared)
+        )
 
     def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
         """Load the meshes of a scene and all that their light needs; see Renderer.preload."""
@@ -115,7 +122,7 @@ class Shapes:
         usual = prepared.usual_spreader
         if damages:
             _ = container.clusters
-        self._probe.container_visibility(container.mesh, _spreader_above(prepared))
+        self._visibility(container.mesh, prepared)
         if shape is None or usual is None:
             self.zone_table(container, None)
             return

@@ -31,7 +31,7 @@ from fastgen.light.sky_visibility import (
 from fastgen.render.depth_map import DepthMap, DrawnBody, MapView, occluder_program
 from fastgen.render.recent_cache import RecentCache
 
-VERSION = 1  # raise when the stored arrays change
+VERSION = 2  # raise when the stored arrays change
 
 _MAP_SIZE = (2048, 512)
 """Texels along and across a container, 6 mm wide for the longest container."""
@@ -128,24 +128,29 @@ class SkyVisibilityProbe:
         self._cells: RecentCache[Cells] = RecentCache(_CAPACITY)
         self._lit: RecentCache[LitMesh] = RecentCache(_LIT_CAPACITY)
 
-    def container_light(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> LitMesh:
+    def container_light(
+        self, container: Mesh, outline: Mesh, spreader: Mesh | None, sky: Sky
+    ) -> LitMesh:
         """Return a container in the light of the sky.
 
         Args:
             container: The mesh.
+            outline: The same surface with few triangles.
             spreader: Spreader above the container, or None.
             sky: The environment.
 
         Returns:
             The lit mesh. A second call with the same arguments returns the same object.
         """
-        visibility = self.container_visibility(container, spreader)
+        visibility = self.container_visibility(container, outline, spreader)
         return self._lit.get((visibility, sky), lambda: _lit(container, visibility, sky))
 
-    def container_visibility(self, container: Mesh, spreader: Mesh | None) -> SkyVisibility:
+    def container_visibility(
+        self, container: Mesh, outline: Mesh, spreader: Mesh | None
+    ) -> SkyVisibility:
         """Return the sky visibility of a container below a spreader or an open sky."""
         key = (container, spreader)
-        return self._visibility(key, lambda: self._of_container(container, spreader))
+        return self._visibility(key, lambda: self._of_container(container, outline, spreader))
 
     def spreader_light(
         self, spreader: Mesh, outline: Mesh, held: Mesh, below: LitMesh, sky: Sky, paints: Paints
@@ -235,9 +240,11 @@ class SkyVisibilityProbe:
         below = self._cached([container], points, _COARSE_SIZE)
         return own & below
 
-    def _of_container(self, container: Mesh, spreader: Mesh | None) -> NDArray[np.uint8]:
+    def _of_container(
+        self, container: Mesh, outline: Mesh, spreader: Mesh | None
+    ) -> NDArray[np.uint8]:
         points = probe_points(container)
-        whole: list[Solid] = [container, core_of(container)]
+        whole: list[Solid] = [outline, core_of(container)]
         visible = self._cached(whole, points, _MAP_SIZE)
         if spreader is not None:
             visible = visible & self._cached([without_cables(spreader)], points, _COARSE_SIZE)
