@@ -1,6 +1,7 @@
 """Fixtures shared by several test files."""
 
 import json
+import os
 import shutil
 from collections import OrderedDict
 
@@ -10,6 +11,10 @@ from fastgen import Config, Generator
 from fastgen.dataset.console import LOGGER
 from tests import in_process
 from tests.report_makers import make_dataset
+
+# Tests compile many programs and draw little with each. Mesa then needs a third less time without
+# LLVM's optimization passes, which do not change results. GALLIVM_PERF= keeps them.
+os.environ.setdefault("GALLIVM_PERF", "nopt")
 
 OPEN_GENERATORS = 4
 """Generators that are kept open; each holds a GL context and its textures."""
