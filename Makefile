@@ -69,9 +69,9 @@ lint: setup
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 
-# A worker that dies ends the run: pytest-xdist would hand its finished files to the next one, and
-# wait for their tests forever. Ray leaves threads in the process that used it and takes over the
-# signals by which Python reports a crash, so its tests have a process of their own.
+# A crashed worker ends the run: pytest-xdist would assign all its files again, even finished ones,
+# and wait for these forever. Ray leaves threads in the process that used it and replaces Python's
+# handlers of fatal signals, so its tests have a process of their own.
 test: glslang chromium lint
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --ignore=tests/test_ray.py
 	$(BIN)/pytest tests/test_ray.py

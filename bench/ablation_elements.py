@@ -263,7 +263,7 @@ ELEMENTS = (
             )
         ),
     ),
-    Element("shape", "door gaskets", container=without_charts("door.gasket")),
+    Element("shape", "door gaskets", container=without_charts("door.gasket", "door.lip")),
     Element("shape", "castings' apertures", container=filled_apertures),
     Element("shape", "fork pockets", container=without_charts("fork.")),
     Element("shape", "seals", lambda scene: replace(scene, seals=())),

@@ -60,7 +60,8 @@ DamageField hanging_gasket_field(int i, vec3 q) {
     float t = q.x / half_length;
     float part = t < apex ? -1.0 / max(1.0 + apex, 1e-3) : 1.0 / (1.0 - apex);
     float flank = (t - apex) * part;
-    float depth = length(q.yz) < damage_across[i].w && abs(flank) < 1.0 ? damage_inward[i].w : 0.0;
+    bool on_lip = length(q.yz) < damage_across[i].w && max(abs(t), abs(flank)) <= 1.0;
+    float depth = on_lip ? damage_inward[i].w : 0.0;
     return DamageField(depth * (1.0 - flank * flank), vec3(-2.0 * depth * flank * part / half_length, 0.0, 0.0),
                        0.0);
 }

@@ -146,8 +146,8 @@ def test_the_shaders_change_nothing_outside_the_reach(gl):
     rng = np.random.default_rng(2)
     scene = Generator(Config(), seed=1).scene(0)
     inside = np.zeros(len(FORM_NAMES), int)
-    for _ in range(13):
-        damages = tuple(random_damage(rng, *name) for name in FORM_NAMES for _ in range(7))
+    for _ in range(15):
+        damages = tuple(random_damage(rng, *name) for name in FORM_NAMES for _ in range(6))
         local, points = zip(*(points_around(rng, each, 100) for each in damages), strict=True)
         number = np.repeat(np.arange(len(damages)), 100)
         drawn = replace(scene, damages=damages)
@@ -162,7 +162,7 @@ def test_the_shaders_change_nothing_outside_the_reach(gl):
         reach = np.array([reach_mm(each) for each in damages])[number]
         outside = (np.abs(np.concatenate(local)) > reach).any(axis=1)
         assert not changed[outside].any()
-        inside += np.bincount(number[changed] // 7, minlength=len(FORM_NAMES))
+        inside += np.bincount(number[changed] // 6, minlength=len(FORM_NAMES))
     assert (inside > 20).all()
 
 

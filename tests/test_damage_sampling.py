@@ -290,7 +290,7 @@ def test_bulges_end_at_the_bottom_rail_where_the_configuration_says_so():
 
 
 def test_only_kinks_that_tilt_a_casting_move_one():
-    """A tilted casting leans: its outer plane is straight and ends where the container ends."""
+    """The outer edge of a tilted casting stays straight, and its end does not move."""
     values = {"count": [1, 1], "kinds": ["axis"]}
     for name, damage in damages_of(**values, axis={"tilted_castings": 0.0}):
         assert not largest_move_of_castings(name, damage)

@@ -315,3 +315,23 @@ def test_the_paint_of_the_roof_tints_the_spreader_above_it():
     difference = reddish[0] - reddish[1]
     assert np.quantile(difference, 0.99) > 20
     assert np.abs(np.median(difference)) < 5  # faces that do not see the roof
+
+
+def test_a_hit_is_represented_by_the_best_of_all_vertices():
+    """Compared by brute force, on random points of the triangles."""
+    spreader = build_spreader(KIND)
+    rng = np.random.default_rng(3)
+    triangle = rng.integers(len(spreader.triangles), size=400)
+    corners = spreader.positions_mm[spreader.triangles].astype(np.float64)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    shares = rng.dirichlet((1, 1, 1), len(triangle))[..., None]
+    met = (shares * corners[triangle]).sum(axis=1)
+    found = interreflection._representatives(met, normals, triangle, spreader)
+    away = met[:, None] - spreader.positions_mm
+    normal = normals[triangle][:, None]
+    turned = 1000 / 2**0.5 * (normal - spreader.normals)
+    off = 20 * (away * normal).sum(axis=-1)
+    apart = (away**2).sum(axis=-1) + (turned**2).sum(axis=-1) + off**2
+    rows = np.arange(len(met))
+    np.testing.assert_allclose(apart[rows, found], apart.min(axis=1), rtol=1e-3, atol=1e-3)

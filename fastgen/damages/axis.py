@@ -7,6 +7,7 @@ import numpy as np
 
 from fastgen.damages.draws import (
     FRAME_MM,
+    MOST_REACH_MM,
     Depth,
     Extent,
     Reach,
@@ -17,6 +18,7 @@ from fastgen.damages.draws import (
 from fastgen.damages.kinked import KINKED
 from fastgen.damages.plain import EDGE
 from fastgen.scene import Damage, Vec3
+from fastgen.scene.container_kinds import CASTING_MM
 from fastgen.scene.damage_kinds import Kind
 from fastgen.validation import Range, Share
 
@@ -29,17 +31,12 @@ _KINK_SOFTNESS = Range(0.03, 0.15)
 _KINKS_ABOVE = 0.25
 """Share of the kinks in posts that are just below the upper casting; others are above the lower."""
 
-_CASTING_MM = 118.0
-"""Height of a casting, ISO 1161."""
-
 _TILT_APEX_MM = (20.0, 90.0)
 """Distance from a tilted casting to the deepest point of its kink."""
 
-_MOST_REACH_MM = 2400.0
-
 _TILT_REACH_MM = 200.0
-"""Additional reach of a kink that tilts a casting: the casting keeps its shape and is not crushed
-along the edge alone."""
+"""Additional reach of a kink that tilts a casting, so that the casting moves as a whole instead of
+being crushed at its edge."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,8 @@ class AxisConfig:
         kink_depth_mm: Largest displacement of a kink.
         kinked_posts: Probability that a kink is in a corner post, just above its lower casting or
             below its upper one. Other kinks may be in any edge.
-        tilted_castings: Probability that a kink in a post includes its casting and tilts it.
+        tilted_castings: Probability that a kink in a post includes its casting and tilts it. The
+            kink is then 118 mm longer and reaches 200 mm farther.
     """
 
     length_mm: Extent = Range(700, 1900)
@@ -90,15 +88,15 @@ def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
     along = np.eye(3)[axis]
     room = 2 * half[axis] - 2 * FRAME_MM
     length = draw(rng, c.kink_length_mm if kinked else c.length_mm, room)
-    reach = draw(rng, c.kink_reach_mm if kinked else c.reach_mm)
     if tilted:
-        length, room = length + _CASTING_MM, 2 * half[axis]
-        reach = min(reach + _TILT_REACH_MM, _MOST_REACH_MM)
+        length, room = round(length + CASTING_MM[2], 2), 2 * half[axis]
     slack = (room - length) / 2
     at = float(rng.uniform(-slack, slack))
-    end = 1.0 if rng.random() < _KINKS_ABOVE else -1.0
     if post:
-        at = slack * end
+        at = slack * (1.0 if rng.random() < _KINKS_ABOVE else -1.0)
+    reach = draw(rng, c.kink_reach_mm if kinked else c.reach_mm)
+    if tilted:
+        reach = min(reach + _TILT_REACH_MM, MOST_REACH_MM)
     damage = Damage(
         kind="axis",
         face=_edge_name(others, signs),
@@ -106,15 +104,15 @@ def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
         along=rounded_vector(along),
         across=rounded_vector(np.cross(inward, along)),
         inward=rounded_vector(inward),
-        size_mm=(round(length, 2), 2 * reach),
+        size_mm=(length, round(2 * reach, 2)),
         depth_mm=draw(rng, c.kink_depth_mm if kinked else c.depth_mm),
     )
     if not kinked:
         return damage
     apex = draw(rng, _KINK_APEX, digits=3)
     if tilted:
-        deepest_mm = _CASTING_MM + float(rng.uniform(*_TILT_APEX_MM))
-        apex = round(end * max(1 - 2 * deepest_mm / length, -0.9), 3)
+        deepest_mm = CASTING_MM[2] + float(rng.uniform(*_TILT_APEX_MM))
+        apex = round(math.copysign(1.0, at) * max(1 - 2 * deepest_mm / length, -0.9), 3)
     shape = (apex, draw(rng, _KINK_SOFTNESS, digits=4))
     return replace(damage, form="kinked", shape=shape, **asdict(draw_wear(rng)))
 

@@ -9,6 +9,7 @@ that bows out of the door. shaders/damage_door_gear.glsl is the GLSL twin.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ from fastgen.scene.door_gear import (
     handle_side,
     hasp_mm,
 )
-from fastgen.validation import Range, Share
+from fastgen.validation import Bounds, Range, Share
 
 _AROUND_MM = 26.0
 """Distance from a bar's axis within which a bend acts: brackets end at 25 mm, the leaf is at 27."""
@@ -68,8 +69,8 @@ _PROUD_MM = 20.0
 _HIDDEN_MM = 90.0
 """Displacement of a missing bar. It is then behind the leaf and inside header and sill."""
 
-_AROUND_LIP_MM = 15.0
-"""Distance from the lip's axis within which a hanging gasket acts: the lip ends at 13 mm, and the
+_AROUND_LIP_MM = 14.0
+"""Distance from the lip's axis within which a hanging gasket acts: the lip ends at 11 mm, and the
 edges of the leaves begin at 18 mm."""
 
 _FREE_ENDS = 0.35
@@ -78,8 +79,11 @@ _FREE_ENDS = 0.35
 _GASKET_APEX = (-0.5, 0.1)
 """Place of a bow's farthest point, in half lengths above its middle: gravity pulls it down."""
 
-_GASKET_TURN_DEG = (10.0, 45.0)
-"""Angle to either side at which a gasket hangs out."""
+_GASKET_TURN_DEG = (5.0, 20.0)
+"""Angle to either side at which a gasket hangs out. A larger one would lead through the leaf."""
+
+_GasketLength = Annotated[Range, Bounds(250.0, 20000.0, "mm")]
+"""Length of a hanging gasket; shorter ones would have too few stations of the lip to bend."""
 
 
 def _bent(damage: Damage, u: Array, v: Array, w: Array) -> Array:
@@ -149,13 +153,13 @@ def _opened_reach(damage: Damage) -> tuple[float, float]:
 
 
 def _hanging(damage: Damage, u: Array, v: Array, w: Array) -> Array:
-    """A bow of two half parabolas whose common vertex is at `apex` half lengths; a lower end at
-    -1 hangs free."""
+    """Return the displacement: two half parabolas that meet at `apex`; at -1 the lower end is
+    free."""
     (apex,) = damage.shape
     half_length, half_width = half_size(damage)
     t = u / half_length
     flank = np.where(t < apex, (apex - t) / max(1 + apex, LEAST), (t - apex) / (1 - apex))
-    on_lip = np.hypot(v, w) < half_width
+    on_lip = (np.hypot(v, w) < half_width) & (np.abs(t) <= 1)
     return np.asarray(damage.depth_mm * np.maximum(1 - flank * flank, 0.0) * on_lip)
 
 
@@ -225,8 +229,9 @@ class DoorGearConfig:
         length_mm: Length of a bend, rounded to whole pieces of about 280 mm.
         depth_mm: Outward displacement of a bent bar.
         swing_mm: Outward displacement of the end of an open handle.
-        gasket_length_mm: Length of a gasket's part that hangs out.
-        gasket_depth_mm: Largest distance of a hanging gasket from its groove.
+        gasket_length_mm: Length of the part that hangs out.
+        gasket_depth_mm: Largest displacement of a hanging gasket. The first 40 mm are between the
+            leaves, where it does not show.
     """
 
     gasket: Share = 0.2
@@ -235,12 +240,12 @@ class DoorGearConfig:
     length_mm: Extent = Range(500, 1150)
     depth_mm: Depth = Range(30, 150)
     swing_mm: Depth = Range(60, 180)
-    gasket_length_mm: Extent = Range(350, 1100)
+    gasket_length_mm: _GasketLength = Range(350, 1100)
     gasket_depth_mm: Depth = Range(80, 220)
 
 
 def _place(c: DoorGearConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
-    """Sample the damage of one part; its place follows from those of bar, handle and lip."""
+    """Sample the damage of one part of the gear."""
     length, _, height = size_mm
     if rng.random() < c.gasket:
         return _hanging_gasket(c, length, height, rng)
@@ -276,7 +281,8 @@ def _hanging_gasket(
     low, high = LIP_END_MM, height_mm - LIP_END_MM
     extent = draw(rng, c.gasket_length_mm, high - low)
     free = rng.random() < _FREE_ENDS
-    start = low if free else float(rng.uniform(low, high - extent))
+    # a free end begins below the lip, so that rounding does not leave its lowest corners behind
+    start = low - 1.0 if free else float(rng.uniform(low, high - extent))
     apex = -1.0 if free else round(float(rng.uniform(*_GASKET_APEX)), 3)
     aside = math.radians(float(rng.uniform(*_GASKET_TURN_DEG)) * rng.choice((-1.0, 1.0)))
     inward = (-math.cos(aside), math.sin(aside), 0.0)

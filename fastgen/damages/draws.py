@@ -14,7 +14,10 @@ Size = tuple[float, float]
 Extent = Annotated[Range, Bounds(5.0, 20000.0, "mm")]
 """Extent that is cut to the size of the face. Fields are divided by it, so it must not vanish."""
 
-Reach = Annotated[Range, Bounds(5.0, 2400.0, "mm")]
+MOST_REACH_MM = 2400.0
+"""Largest reach of a damage."""
+
+Reach = Annotated[Range, Bounds(5.0, MOST_REACH_MM, "mm")]
 """Extent that is not cut to the size of the face."""
 
 Depth = Annotated[Range, Bounds(0.0, 2400.0, "mm")]

@@ -7,8 +7,9 @@ rounder arc nor the walls inside.
 
 import numpy as np
 
-from fastgen.geometry.container_layout import CASTING_MM, Array, Layout
+from fastgen.geometry.container_layout import Array, Layout
 from fastgen.geometry.unfold import Patch, Sheet, beside, flat, polygon
+from fastgen.scene.container_kinds import CASTING_MM
 from fastgen.scene.faces import FACE_AXES, FACES
 
 APERTURE_CENTER_MM = (101.5, 89.0, 59.0)

@@ -9,13 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.scene.container_kinds import ContainerKind, WallProfiles
+from fastgen.scene.container_kinds import CASTING_MM, ContainerKind, WallProfiles
 
 Array = NDArray[np.float64]
 
-
-CASTING_MM = (178.0, 162.0, 118.0)
-"""Size of a corner fitting along x, y and z; ISO 1161."""
 
 OVERLAP_MM = 5.0
 """Parts overlap by this much, so that no ray passes between them."""

@@ -7,7 +7,6 @@ import numpy as np
 from fastgen.geometry.container_layout import (
     BASE_RAIL_TOP_MM,
     BESIDE_MM,
-    CASTING_MM,
     DOOR_RING_MM,
     FLOOR_MM,
     FRONT_SILL_TOP_MM,
@@ -19,6 +18,7 @@ from fastgen.geometry.container_layout import (
 )
 from fastgen.geometry.container_walls import Panel
 from fastgen.geometry.unfold import Patch, Sheet, breaks, coarsened, prism, sweep
+from fastgen.scene.container_kinds import CASTING_MM
 from fastgen.scene.faces import FACE_AXES
 
 FORK_CENTERS_MM = (-1025.0, 1025.0)

@@ -8,14 +8,13 @@ import numpy as np
 from fastgen.errors import ConfigError
 from fastgen.geometry.container_layout import (
     BASE_RAIL_TOP_MM,
-    CASTING_MM,
     FRONT_SILL_TOP_MM,
     OVERLAP_MM,
     Array,
     Layout,
 )
 from fastgen.geometry.unfold import Sheet, breaks, sweep
-from fastgen.scene.container_kinds import Wave
+from fastgen.scene.container_kinds import CASTING_MM, Wave
 from fastgen.scene.faces import FACE_AXES
 
 Flats = tuple[tuple[float, float], ...]

@@ -12,6 +12,7 @@ from fastgen.damages.fields import FADE_END_MM, FADE_START_MM, smoothstep
 from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.scene import Damage, Vec3
 from fastgen.scene.damage_kinds import form_of
+from fastgen.scene.faces import FACE_AXES
 
 Array = NDArray[np.floating]
 
@@ -143,8 +144,7 @@ def faces(damage: Damage, position_mm: Vec3, beside: tuple[Damage, ...] = ()) ->
     arguments are those of may_be_seen.
     """
     toward = np.array(position_mm) - np.array(damage.origin_mm)
-    # the inward axis is a coordinate axis for a sheet, and lies between two for an edge
-    outward = [-np.sign(c) * toward[i] for i, c in enumerate(damage.inward) if abs(c) > 0.1]
+    outward = [float(toward @ FACE_AXES[face].out) for face in damage.face.split(".")]
     pushed_mm = sum(map(outward_mm, beside))
     outside: bool = max(outward) > -SLACK_MM - pushed_mm
     return outside

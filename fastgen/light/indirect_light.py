@@ -17,7 +17,7 @@ from fastgen.files import disk_cache
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.solids import Body
 
-VERSION = 1  # raise when the stored arrays change
+VERSION = 2  # raise when the stored arrays change
 
 _CELL_MM = 500.0
 """Approximate width of the container's emitting cells. The visibility of the sky on the roof below
@@ -205,13 +205,18 @@ def _computed(
 def _found(
     spreader: Mesh, body: Body, box: Array, points: Array, toward: Array, hidden: NDArray[np.bool_]
 ) -> dict[str, NDArray[np.int32]]:
-    """Return receivers, direction indices and emitters, int32 [3, K], for each kind of emitter."""
+    """Cast a ray from each vertex of the spreader in each direction in which the sky is hidden.
+
+    Returns:
+        Receiver, direction and emitter of each ray that hits, int32 [3, K]. The emitters of "own"
+        are vertices of the spreader, those of "below" are cells of the container's box.
+    """
     corners = body.positions_mm[body.triangles].astype(np.float64)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     corners, normals = corners[size[:, 0] > 0], (normals / np.maximum(size, 1e-9))[size[:, 0] > 0]
     facing = spreader.normals @ toward.T > 0
-    own: list[NDArray[np.int32]] = []
+    own: list[NDArray[np.int32]] = []  # with the triangle that each ray hits as its emitter
     below: list[NDArray[np.int32]] = []
     places: list[Array] = []
     for number, ray in enumerate(toward):
@@ -227,16 +232,21 @@ def _found(
         places.append(start[on_own] + own_mm[on_own, None] * ray)
         met = start[on_box] + box_mm[on_box, None] * ray
         below.append(_rows(receiver[on_box], number, cell_of(side[on_box], met, box)))
-    found = np.concatenate(own, axis=1)
-    found[2] = _representatives(np.concatenate(places), normals, found[2], spreader)
-    return {"own": found, "below": np.concatenate(below, axis=1)}
+    receiver, ray, triangle = np.concatenate(own, axis=1)
+    emitter = _representatives(np.concatenate(places), normals, triangle, spreader)
+    return {
+        "own": np.stack([receiver, ray, emitter]).astype(np.int32),
+        "below": np.concatenate(below, axis=1),
+    }
 
 
 def _representatives(met: Array, normals: Array, triangle: Numbers, spreader: Mesh) -> Numbers:
-    """Return the vertex [K] that represents each hit.
+    """Return the vertex [K] that represents each hit: close by, of similar normal, in its plane.
 
-    Among hits with one normal, a vertex is compared by a Euclidean distance in a space that has the
-    distance from their planes as one more axis. A tree in that space finds the nearest one.
+    The squared distance is that of the positions, plus that of the normals scaled by _TURNED_MM,
+    plus that from the plane of the hit scaled by _OFF_PLANE. The planes of hits with one normal are
+    parallel, so the last term is one more coordinate, and a k-d tree for each normal finds the
+    nearest vertex.
 
     Args:
         met: Positions of the hits, [K, 3].
@@ -246,21 +256,22 @@ def _representatives(met: Array, normals: Array, triangle: Numbers, spreader: Me
     """
     from scipy.spatial import cKDTree  # imported late: takes 0.3 s
 
-    distinct, number = np.unique(normals.round(6), axis=0, return_inverse=True)
-    number = number[triangle]
+    # rounded, so that coplanar triangles share a tree
+    distinct, group = np.unique(normals.round(6), axis=0, return_inverse=True)
+    group = group[triangle]
     found = np.empty(len(met), np.int64)
     for i, normal in enumerate(distinct):
-        rows = np.flatnonzero(number == i)
-        if len(rows):
-            tree = cKDTree(_embedded(spreader.positions_mm, spreader.normals, normal))
-            same = np.broadcast_to(normal, (len(rows), 3))
-            found[rows] = tree.query(_embedded(met[rows], same, normal))[1]
+        hits = np.flatnonzero(group == i)
+        if len(hits):
+            tree = cKDTree(_coordinates(spreader.positions_mm, spreader.normals, normal))
+            hit_normals = np.broadcast_to(normal, (len(hits), 3))
+            found[hits] = tree.query(_coordinates(met[hits], hit_normals, normal))[1]
     return found
 
 
-def _embedded(positions_mm: Array, normals: Array, plane: Array) -> Array:
-    """Return points [N, 7] in the space of `_representatives` for planes with a normal."""
-    off = _OFF_PLANE * (positions_mm @ plane)[:, None]
+def _coordinates(positions_mm: Array, normals: Array, normal: Array) -> Array:
+    """Return the coordinates [N, 7] in which `_representatives` searches for hits with a normal."""
+    off = _OFF_PLANE * (positions_mm @ normal)[:, None]
     return np.concatenate([positions_mm, _TURNED_MM / 2**0.5 * normals, off], axis=-1)
 
 

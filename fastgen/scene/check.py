@@ -119,16 +119,16 @@ def _check_contents(carrier: Scene | Neighbour, path: str, own: OwnDecals) -> No
     for i, damage in enumerate(carrier.damages):
         _check_damage(damage, f"{path}.damages[{i}]")
     sealed = {seal.hasp for seal in carrier.seals}
-    for bar, count in Counter(damaged_gear(carrier.damages)).items():
+    for number, count in Counter(damaged_gear(carrier.damages)).items():
         if count > 1:
-            part = "gasket of the door" if bar == LIP else f"door gear of locking bar {bar}"
+            part = "gasket of the door" if number == LIP else f"door gear of locking bar {number}"
             raise ConfigError(
                 f"{path}.damages: {count} damage the {part}, which has at most one such damage; "
                 "remove some"
             )
-        if bar in sealed:
+        if number in sealed:
             raise ConfigError(
-                f"{path}.seals: one is at hasp {bar}, but {path}.damages has a damage of its "
+                f"{path}.seals: one is at hasp {number}, but {path}.damages has a damage of its "
                 "locking bar; remove one of them"
             )
 

@@ -13,6 +13,9 @@ from fastgen.validation import Bounds
 
 Array = NDArray[np.float64]
 
+CASTING_MM = (178.0, 162.0, 118.0)
+"""Size of a corner casting along x, y and z; ISO 1161."""
+
 
 @dataclass(frozen=True)
 class ContainerKind:

@@ -41,7 +41,7 @@ LIP_Y_MM = 0.0
 LIP_INSET_MM = 94.0
 """Inset of the lip's axis. There the gasket and the edges of the leaves hide the lip."""
 
-LIP_HALF_MM = (5.0, 12.0)
+LIP_HALF_MM = (5.0, 9.0)
 """Half extents of the lip's section along x and y."""
 
 LIP_END_MM = 150.0
