@@ -163,7 +163,7 @@ SECTIONS = {
             _damage("graffiti: a sprayed tag", "graffiti", 11),
             _damage("door_gear: a bent bar", "door_gear", 13, gasket=0, missing=0, open=0),
             _damage("door_gear: an open handle", "door_gear", 11, gasket=0, missing=0, open=1),
-            _damage("door_gear: a hanging gasket", "door_gear", 3, gasket=1.0),
+            _damage("door_gear: a hanging gasket", "door_gear", 2, gasket=1.0),
         )
     ),
     "light": Section(
