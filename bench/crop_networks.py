@@ -1,7 +1,7 @@
 """Training of small networks for crops: a classifier, and the reader of identifiers."""
 
 import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -109,7 +109,8 @@ def fit_pairs(
     """Train a classifier of two classes on pairs of crops.
 
     A batch has both crops of each pair, varied and mirrored in the same way, so the network sees no
-    other difference between the classes.
+    other difference between the classes. Half of the pairs have a lower resolution: photographs of
+    damages may have been enlarged.
 
     Args:
         positive: RGB crops [N, S, S, 3] of class 1.
@@ -127,8 +128,8 @@ def fit_pairs(
         chosen = torch.randint(len(positive), (count,))
         ones, others = (_input(side[chosen]) for side in sides)
         with torch.random.fork_rng(devices=[]):
-            ones = _varied(ones)
-        crops = torch.cat([ones, _varied(others)])
+            ones = _varied(ones, enlarged)
+        crops = torch.cat([ones, _varied(others, enlarged)])
         mirrored = torch.rand(count).repeat(2)[:, None, None, None] < 0.5
         crops = torch.where(mirrored, crops.flip(3), crops)
         return functional.cross_entropy(model(crops), targets, label_smoothing=0.05)
@@ -163,8 +164,37 @@ def _text_batches(
             yield varied_batch([group[int(k)] for k in rng.integers(len(group), size=size)], rng)
 
 
-def _varied(crops: torch.Tensor) -> torch.Tensor:
-    """Randomly rotate, scale and shift crops [B, 3, S, S] in 0..1, and vary their tones."""
+def softened(images: torch.Tensor) -> torch.Tensor:
+    """Randomly blur half of the images [B, 3, H, W], by up to three pixels."""
+    soft = functional.avg_pool2d(images, 3, 1, 1, count_include_pad=False)
+    return images + _drawn_for_half(len(images)) * (soft - images)
+
+
+def enlarged(images: torch.Tensor) -> torch.Tensor:
+    """Randomly lower the resolution of half of the images [B, 3, H, W], by a factor up to 4."""
+    level = 2 * _drawn_for_half(len(images))
+    found = images * (1 - level).clamp(min=0)
+    for step in (1, 2):
+        small = functional.avg_pool2d(images, 2**step, ceil_mode=True, count_include_pad=False)
+        large = functional.interpolate(small, images.shape[2:], mode="bilinear")
+        found = found + large * (1 - (level - step).abs()).clamp(min=0)
+    return found
+
+
+def _drawn_for_half(count: int) -> torch.Tensor:
+    """Draw values [count, 1, 1, 1] in 0..1 for half of the images, and 0 for the others."""
+    return torch.rand(count, 1, 1, 1) * (torch.rand(count, 1, 1, 1) < 0.5)
+
+
+def _varied(
+    crops: torch.Tensor, resolution: Callable[[torch.Tensor], torch.Tensor] = softened
+) -> torch.Tensor:
+    """Randomly rotate, scale and shift crops [B, 3, S, S] in 0..1, and vary their tones.
+
+    Args:
+        crops: The crops.
+        resolution: Changes their resolution.
+    """
     count, _, side, _ = crops.shape
 
     def drawn(spread: float, *shape: int) -> torch.Tensor:
@@ -178,20 +208,25 @@ def _varied(crops: torch.Tensor) -> torch.Tensor:
         1,
     )
     grid = functional.affine_grid(maps, [count, 3, side, side], align_corners=False)
-    return toned(functional.grid_sample(crops, grid, padding_mode="border", align_corners=False))
+    moved = functional.grid_sample(crops, grid, padding_mode="border", align_corners=False)
+    return toned(moved, resolution)
 
 
-def toned(images: torch.Tensor) -> torch.Tensor:
-    """Randomly blur images [B, 3, H, W] in 0..1, change their tones, and add noise."""
+def toned(
+    images: torch.Tensor, resolution: Callable[[torch.Tensor], torch.Tensor] = softened
+) -> torch.Tensor:
+    """Randomly change resolution and tones of images [B, 3, H, W] in 0..1, and add noise.
+
+    Args:
+        images: The images.
+        resolution: Changes their resolution.
+    """
     count = len(images)
 
     def drawn(spread: float, *shape: int) -> torch.Tensor:
         return spread * torch.randn(count, *shape)
 
-    soft = functional.avg_pool2d(images, 3, 1, 1, count_include_pad=False)
-    softness = torch.rand(count, 1, 1, 1) * (torch.rand(count, 1, 1, 1) < 0.5)
-    images = images + softness * (soft - images)
-    images = images.clamp(1e-3, 1) ** torch.exp(drawn(0.3, 1, 1, 1))
+    images = resolution(images).clamp(1e-3, 1) ** torch.exp(drawn(0.3, 1, 1, 1))
     images = images * (1 + drawn(0.06, 3, 1, 1)) + drawn(0.03, 3, 1, 1)
     return images + torch.rand(count, 1, 1, 1) * 0.03 * torch.randn_like(images)
 
