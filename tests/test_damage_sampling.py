@@ -292,9 +292,9 @@ def test_bulges_end_at_the_bottom_rail_where_the_configuration_says_so():
 def test_only_kinks_that_tilt_a_casting_move_one():
     """The outer edge of a tilted casting stays straight, and its end does not move."""
     values = {"count": [1, 1], "kinds": ["axis"]}
-    for name, damage in damages_of(**values, axis={"tilted_castings": 0.0}):
+    for name, damage in damages_of(**values, axis={"tilted_castings": 0.0, "leaning_posts": 0.0}):
         assert not largest_move_of_castings(name, damage)
-    posts = {"kinked": 1.0, "kinked_posts": 1.0, "tilted_castings": 1.0}
+    posts = {"kinked": 1.0, "kinked_posts": 1.0, "leaning_posts": 0.0, "tilted_castings": 1.0}
     tilted = damages_of(**values, axis=posts)
     assert len(tilted) > 100
     for name, damage in tilted:
@@ -306,6 +306,25 @@ def test_only_kinks_that_tilt_a_casting_move_one():
         move = damage_law.amount_mm(damage, edge)
         assert abs(move[0]) < 1
         np.testing.assert_allclose(move, np.linspace(0, move[-1], 5), atol=0.12 * move[-1])
+
+
+def test_a_leaning_post_is_straight_from_one_end_to_its_deepest_point():
+    posts = {"kinked": 1.0, "kinked_posts": 1.0, "leaning_posts": 1.0}
+    leaning = damages_of(count=[1, 1], kinds=["axis"], axis=posts)
+    assert len(leaning) > 100
+    for name, damage in leaning:
+        z = np.linspace(0, KINDS[name].height_mm, 201)
+        line = np.column_stack([np.tile(damage.origin_mm[:2], (len(z), 1)), z])
+        move = damage_law.amount_mm(damage, line)
+        deepest = int(move.argmax())
+        assert abs(move[0]) < 1
+        assert abs(move[-1]) < 1
+        assert move[deepest] > 0.85 * damage.depth_mm  # it is rounded
+        assert 0.08 < deepest / 200 < 0.92
+        assert abs(deepest / 200 - 0.5) > 0.08
+        for part in (move[: deepest + 1], move[deepest:]):
+            straight = np.linspace(part[0], part[-1], len(part))
+            np.testing.assert_allclose(part, straight, atol=0.15 * damage.depth_mm)
 
 
 def largest_move_of_castings(name, damage):

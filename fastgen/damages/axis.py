@@ -34,8 +34,11 @@ _KINKS_ABOVE = 0.25
 _TILT_APEX_MM = (20.0, 90.0)
 """Distance from a tilted casting to the deepest point of its kink."""
 
+_LEAN_APEX = Range(0.2, 0.8)
+"""Place of the deepest point of a leaning post, in half heights from its middle."""
+
 _TILT_REACH_MM = 200.0
-"""Additional reach of a kink that tilts a casting, so that the casting moves as a whole instead of
+"""Additional reach of a kink that tilts castings, so that a casting moves as a whole instead of
 being crushed at its edge."""
 
 
@@ -54,8 +57,10 @@ class AxisConfig:
         kink_depth_mm: Largest displacement of a kink.
         kinked_posts: Probability that a kink is in a corner post, just above its lower casting or
             below its upper one. Other kinks may be in any edge.
-        tilted_castings: Probability that a kink in a post includes its casting and tilts it. The
-            kink is then 118 mm longer and reaches 200 mm farther.
+        leaning_posts: Probability that a kink in a post is as long as the post, which then leans
+            from one casting to the deepest point, and both castings tilt.
+        tilted_castings: Probability that another kink in a post includes its casting and tilts it.
+            The kink is then 118 mm longer. Kinks that tilt castings reach 200 mm farther.
     """
 
     length_mm: Extent = Range(700, 1900)
@@ -66,18 +71,20 @@ class AxisConfig:
     kink_reach_mm: Reach = Range(120, 260)
     kink_depth_mm: Depth = Range(40, 130)
     kinked_posts: Share = 0.5
+    leaning_posts: Share = 0.1
     tilted_castings: Share = 0.3
 
 
 def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
     """Sample a dent of one of the twelve edges, pushed in diagonally.
 
-    It is clear of the castings, except for kinks that tilt one.
+    It is clear of the castings, except for kinks that tilt them.
     """
     half = np.array(size_mm) / 2
     kinked = bool(rng.random() < c.kinked)
     post = kinked and bool(rng.random() < c.kinked_posts)
-    tilted = post and bool(rng.random() < c.tilted_castings)
+    leaning = post and bool(rng.random() < c.leaning_posts)
+    tilted = post and not leaning and bool(rng.random() < c.tilted_castings)
     axis = 2 if post else int(rng.integers(3))
     others = [i for i in range(3) if i != axis]
     signs = rng.choice([-1.0, 1.0], size=2)
@@ -88,14 +95,15 @@ def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
     along = np.eye(3)[axis]
     room = 2 * half[axis] - 2 * FRAME_MM
     length = draw(rng, c.kink_length_mm if kinked else c.length_mm, room)
-    if tilted:
-        length, room = round(length + CASTING_MM[2], 2), 2 * half[axis]
+    if leaning or tilted:
+        room = 2 * half[axis]
+        length = room if leaning else round(length + CASTING_MM[2], 2)
     slack = (room - length) / 2
     at = float(rng.uniform(-slack, slack))
     if post:
         at = slack * (1.0 if rng.random() < _KINKS_ABOVE else -1.0)
     reach = draw(rng, c.kink_reach_mm if kinked else c.reach_mm)
-    if tilted:
+    if leaning or tilted:
         reach = min(reach + _TILT_REACH_MM, MOST_REACH_MM)
     damage = Damage(
         kind="axis",
@@ -110,6 +118,8 @@ def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
     if not kinked:
         return damage
     apex = draw(rng, _KINK_APEX, digits=3)
+    if leaning:
+        apex = draw(rng, _LEAN_APEX, digits=3) * float(rng.choice((-1.0, 1.0)))
     if tilted:
         deepest_mm = CASTING_MM[2] + float(rng.uniform(*_TILT_APEX_MM))
         apex = round(math.copysign(1.0, at) * max(1 - 2 * deepest_mm / length, -0.9), 3)
