@@ -154,7 +154,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             f"{statistics.median(each):4.1f}"
             for view, each in by_view.items()
         ]
-        print(f"{form:18}" + "   ".join(cells))
+        print(f"{form:26}" + "   ".join(cells))
     save("damages", results)
 
 
