@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from fastgen.classes import DAMAGE_CLASSES, DRAWN_DAMAGE_CLASSES
+from fastgen.classes import BUNDLED_DAMAGE_CLASSES, DAMAGE_CLASSES, DRAWN_DAMAGE_CLASSES
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
@@ -76,6 +76,20 @@ def test_damage_stays_in_its_ranges_and_on_the_container(many):
 def test_scenes_with_damage_round_trip_through_json(many):
     scene = next(scene for scene in many if len(scene.damages) > 2)
     assert Scene.from_json(scene.to_json()) == scene
+
+
+@pytest.mark.parametrize("shares", [0.0, 1.0])
+def test_damages_have_plain_numbers_alone(shares):
+    """NumPy's numbers are floats as well, but not every writer of JSON accepts them."""
+    axis = {"kinked": shares, "kinked_posts": shares, "leaning_posts": shares}
+    gear = {"gasket": shares, "missing": shares, "open": shares}
+    kinds = list(BUNDLED_DAMAGE_CLASSES)
+    found = damages_of(kinds=kinds, count=[9, 9], axis=axis, door_gear=gear)
+    assert {damage.kind for _, damage in found} == set(kinds)
+    for _, damage in found:
+        for value in vars(damage).values():
+            values = value if isinstance(value, tuple) else (value,)
+            assert {type(each) for each in values} <= {float, str}, damage
 
 
 def test_a_hundred_damages_of_one_kind_are_refused():

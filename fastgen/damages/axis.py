@@ -96,7 +96,7 @@ def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
     room = 2 * half[axis] - 2 * FRAME_MM
     length = draw(rng, c.kink_length_mm if kinked else c.length_mm, room)
     if leaning or tilted:
-        room = 2 * half[axis]
+        room = float(2 * half[axis])
         length = room if leaning else round(length + CASTING_MM[2], 2)
     slack = (room - length) / 2
     at = float(rng.uniform(-slack, slack))
