@@ -163,8 +163,9 @@ def test_a_mark_changes_the_image_in_its_mask_and_nowhere_else(generator, kind):
     mask, border = marked.damage > 200, oracle.near_edge(marked.damage)
     assert mask.sum() > 200
     assert changed[mask & ~border].mean() > 0.7
-    # the pixel filter may see a sliver of the mark that no pixel centre beside it shows
-    assert changed[~mask & ~border].sum() <= 1
+    # the pixel filter may see a sliver of the mark that no pixel centre beside it shows, and the
+    # programs with and without damage may round a sample on an edge otherwise
+    assert changed[~mask & ~border].sum() <= 3
 
 
 def test_marks_of_later_kinds_cover_those_of_earlier_ones(generator):
