@@ -128,8 +128,8 @@ def fit_pairs(
         chosen = torch.randint(len(positive), (count,))
         ones, others = (_input(side[chosen]) for side in sides)
         with torch.random.fork_rng(devices=[]):
-            ones = _varied(ones, enlarged)
-        crops = torch.cat([ones, _varied(others, enlarged)])
+            ones = _varied(ones, _enlarged)
+        crops = torch.cat([ones, _varied(others, _enlarged)])
         mirrored = torch.rand(count).repeat(2)[:, None, None, None] < 0.5
         crops = torch.where(mirrored, crops.flip(3), crops)
         return functional.cross_entropy(model(crops), targets, label_smoothing=0.05)
@@ -164,13 +164,13 @@ def _text_batches(
             yield varied_batch([group[int(k)] for k in rng.integers(len(group), size=size)], rng)
 
 
-def softened(images: torch.Tensor) -> torch.Tensor:
+def _softened(images: torch.Tensor) -> torch.Tensor:
     """Randomly blur half of the images [B, 3, H, W], by up to three pixels."""
     soft = functional.avg_pool2d(images, 3, 1, 1, count_include_pad=False)
     return images + _drawn_for_half(len(images)) * (soft - images)
 
 
-def enlarged(images: torch.Tensor) -> torch.Tensor:
+def _enlarged(images: torch.Tensor) -> torch.Tensor:
     """Randomly lower the resolution of half of the images [B, 3, H, W], by a factor up to 4."""
     level = 2 * _drawn_for_half(len(images))
     found = images * (1 - level).clamp(min=0)
@@ -187,7 +187,7 @@ def _drawn_for_half(count: int) -> torch.Tensor:
 
 
 def _varied(
-    crops: torch.Tensor, resolution: Callable[[torch.Tensor], torch.Tensor] = softened
+    crops: torch.Tensor, resolution: Callable[[torch.Tensor], torch.Tensor] = _softened
 ) -> torch.Tensor:
     """Randomly rotate, scale and shift crops [B, 3, S, S] in 0..1, and vary their tones.
 
@@ -213,7 +213,7 @@ def _varied(
 
 
 def toned(
-    images: torch.Tensor, resolution: Callable[[torch.Tensor], torch.Tensor] = softened
+    images: torch.Tensor, resolution: Callable[[torch.Tensor], torch.Tensor] = _softened
 ) -> torch.Tensor:
     """Randomly change resolution and tones of images [B, 3, H, W] in 0..1, and add noise.
 

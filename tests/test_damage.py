@@ -158,14 +158,15 @@ def test_every_form_matches_rays_from_close_by(generator, kind, form):
 def test_a_mark_changes_the_image_in_its_mask_and_nowhere_else(generator, kind):
     scene = close_up(scene_with(generator, kind), kind)
     marked = generator.render(scene=scene, camera="close")
-    bare = generator.render(scene=replace(scene, damages=()), camera="close")
+    # a tiny mark, so that the same programs draw both images: others may round edges otherwise
+    tiny = tuple(replace(damage, size_mm=(6.0, 6.0)) for damage in scene.damages)
+    bare = generator.render(scene=replace(scene, damages=tiny), camera="close")
     changed = np.abs(marked.image.astype(int) - bare.image).max(axis=2) > 2
     mask, border = marked.damage > 200, oracle.near_edge(marked.damage)
     assert mask.sum() > 200
     assert changed[mask & ~border].mean() > 0.7
-    # the pixel filter may see a sliver of the mark that no pixel centre beside it shows, and the
-    # programs with and without damage may round a sample on an edge otherwise
-    assert changed[~mask & ~border].sum() <= 3
+    # the pixel filter may see a sliver of the mark that no pixel centre beside it shows
+    assert changed[~mask & ~border].sum() <= 1
 
 
 def test_marks_of_later_kinds_cover_those_of_earlier_ones(generator):

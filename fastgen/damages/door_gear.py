@@ -230,8 +230,8 @@ class DoorGearConfig:
         depth_mm: Outward displacement of a bent bar.
         swing_mm: Outward displacement of the end of an open handle.
         gasket_length_mm: Length of the part that hangs out.
-        gasket_depth_mm: Largest displacement of a hanging gasket. The first 40 mm are between the
-            leaves, where it does not show.
+        gasket_depth_mm: Largest displacement of a hanging gasket. The leaves hide the gasket up to
+            about 40 mm.
     """
 
     gasket: Share = 0.2
