@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fastgen.files import disk_cache
 from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.parallel_rays import entered, first_hits
 from fastgen.geometry.solids import Body
 
 VERSION = 2  # raise when the stored arrays change
@@ -38,9 +39,6 @@ two sides of a plate, or two plates, may be as close as the vertices of one face
 
 _LEAST_KNOWN = 0.25
 """Least known share of a hemisphere by which the known part is scaled up."""
-
-_PARTS = 16
-"""Number of batches of rays, from left to right."""
 
 _BOUNCES = 2
 """Number of bounces. A third changes the mean FLIP of objects in bench/references by 0.0001."""
@@ -224,8 +222,8 @@ def _found(
         start = points[receiver]
         # a face turned away is the inside of a body
         before = np.flatnonzero(normals @ ray < -1e-3)
-        hit, own_mm = _first_hits(start, ray, corners[before])
-        side, box_mm = _entered(start, ray, box)
+        hit, own_mm = first_hits(start, ray, corners[before])
+        side, box_mm = entered(start, ray, box)
         on_box = box_mm < own_mm
         on_own = ~on_box & np.isfinite(own_mm)
         own.append(_rows(receiver[on_own], number, before[hit[on_own]]))
@@ -279,73 +277,9 @@ def _rows(receiver: Numbers, ray: int, emitter: Numbers) -> NDArray[np.int32]:
     return np.stack([receiver, np.full(len(receiver), ray), emitter]).astype(np.int32)
 
 
-def _first_hits(start: Array, ray: Array, corners: Array) -> tuple[NDArray[np.intp], Array]:
-    """Cast parallel rays at triangles that all face them.
-
-    Args:
-        start: Origins, [N, 3].
-        ray: Direction, [3].
-        corners: [T, 3, 3].
-
-    Returns:
-        Index of the first triangle that each ray hits, and its distance, inf without a hit.
-    """
-    # batches along x, because spreaders are long and few triangles share a range of x
-    along = np.array([1.0, 0.0, 0.0]) - ray[0] * ray
-    along /= np.linalg.norm(along)
-    frame = np.stack([along, np.cross(ray, along), ray])
-    at, seen = start @ frame.T, corners @ frame.T
-    # the side of an edge and the distance to the plane are linear in the position of the origin;
-    # corners are clockwise as the rays see them
-    run, rise = (np.roll(seen, -1, axis=1) - seen)[..., :2].transpose(2, 0, 1)
-    edges = np.stack([-rise, run, rise * seen[..., 0] - run * seen[..., 1]])
-    across = np.cross(seen[:, 1] - seen[:, 0], seen[:, 2] - seen[:, 0])
-    slope = -across[:, :2] / across[:, 2:]
-    planes = np.column_stack([slope, seen[:, 0, 2] - (slope * seen[:, 0, :2]).sum(axis=1)]).T
-    edges, planes = edges.astype(np.float32), planes.astype(np.float32)
-    low, high = seen[..., 0].min(axis=1), seen[..., 0].max(axis=1)
-    first, away = np.zeros(len(at), np.intp), np.full(len(at), np.inf)
-    for part in np.array_split(np.argsort(at[:, 0]), _PARTS):
-        if not len(part):
-            continue
-        left, right = at[part[[0, -1]], 0]
-        near = np.flatnonzero((low <= right) & (high >= left))
-        if not len(near):
-            continue
-        places = np.column_stack([at[part, :2], np.ones(len(part))]).astype(np.float32)
-        outside = places @ edges[:, near, 0]
-        for k in (1, 2):
-            np.maximum(outside, places @ edges[:, near, k], out=outside)
-        far = places @ planes[:, near] - at[part, 2:].astype(np.float32)
-        far[(outside > 0) | (far <= 0)] = np.inf
-        least = far.argmin(axis=1)
-        first[part], away[part] = near[least], far[np.arange(len(part)), least]
-    return first, away
-
-
 def box_of(container: Mesh) -> Array:
     """Return the lowest and highest coordinates of a container, [2, 3]."""
     return np.stack(container.bounds_mm).astype(np.float64)
-
-
-def _entered(start: Array, ray: Array, box: Array) -> tuple[NDArray[np.intp], Array]:
-    """Intersect parallel rays with a box.
-
-    Args:
-        start: Origins [N, 3], outside the box.
-        ray: Direction, [3].
-        box: Lowest and highest coordinates, [2, 3].
-
-    Returns:
-        Side through which each ray enters, 2 k for the lower side of axis k and 2 k + 1 for the
-        upper, and the distance, inf if the ray misses.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        near, far = np.sort((box[:, None] - start) / ray, axis=0)
-    axis = near.argmax(axis=1)
-    entry = near.max(axis=1)
-    hit = (entry > 0) & (entry < far.min(axis=1))
-    return 2 * axis + (ray[axis] < 0), np.where(hit, entry, np.inf)
 
 
 def _counts(box: Array) -> NDArray[np.intp]:

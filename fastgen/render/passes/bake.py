@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from fastgen.classes import DRAWN_DAMAGE_CLASSES
 from fastgen.errors import ConfigError
+from fastgen.geometry.atlas_packing import GUTTER_MM
 from fastgen.geometry.mesh import Mesh
-from fastgen.geometry.unfold import GUTTER_MM
 from fastgen.render.constants import GUTTER_STEPS
 from fastgen.render.program import Programs, ShaderProgram, Textures
 from fastgen.render.variant import ShaderVariant
