@@ -1,16 +1,18 @@
 """Values of the ground's uniform block: containers as boxes, props, and the look of the plane."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastgen.geometry.container_layout import BESIDE_MM, RING_BOTTOM_MM, Layout
 from fastgen.geometry.prepared_scene import Member
 from fastgen.light.ground_light import GRID, LOW_GAP_M, GroundLight
 from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.constants import GROUND_FADE_START
 from fastgen.scene import Ground, Prop
-from fastgen.scene.boxes import prop_box
+from fastgen.scene.boxes import OrientedBox, prop_box
 from fastgen.scene.limits import MM
 
 _STAINED = 0.045
@@ -20,6 +22,9 @@ _NO_GAP_M = 1e6
 """Height of a gap below a box for which the grid of light is fine enough."""
 
 _LEAST_GAP_M = 1e-3
+
+_RAIL_INSET_MM = Layout.frame_recess_mm + BESIDE_MM
+"""Distance of the bottom rails from the outer plane of the castings."""
 
 _CLEARANCE_MM = 1500.0
 """Width of the ground around the scene that no part of the panorama hides."""
@@ -41,16 +46,15 @@ def ground_values(
         light: Light on the plane around `members`.
         toward: Unit vector [3] to the first directional light.
     """
-    bodies = [member.box for member in members] + [prop_box(prop) for prop in props]
+    bodies = [_within_rails(member.box) for member in members] + [prop_box(prop) for prop in props]
     rows = np.zeros((3, MAX_BOXES + len(props), 4))
     places = [*range(len(members)), *range(MAX_BOXES, MAX_BOXES + len(props))]
     for place, body in zip(places, bodies, strict=True):
         rows[0, place] = *body.center_mm * MM, body.rotation[0, 0]
         rows[1, place] = *body.half_mm * MM, body.rotation[1, 0]
-    for place, member in enumerate(members):
+    for place, (member, box) in enumerate(zip(members, bodies, strict=False)):
         rows[2, place, :3] = member.prepared.scene.surface.paint.albedo
-        center, half = member.box.center_mm[2] * MM, member.box.half_mm[2] * MM
-        gap = center - half - ground.height_mm * MM
+        gap = (box.center_mm[2] - box.half_mm[2] - ground.height_mm) * MM
         rows[2, place, 3] = max(gap, _LEAST_GAP_M) if gap < LOW_GAP_M else _NO_GAP_M
     for place, prop in enumerate(props, MAX_BOXES):
         rows[2, place] = *prop.albedo, 2.0 if prop.shape == "cylinder" else 0.0
@@ -84,6 +88,16 @@ def ground_values(
         "box_count": len(members),
         "ground_clear_m": clear_radius_mm(ground, members, props) * MM,
     }
+
+
+def _within_rails(box: OrientedBox) -> OrientedBox:
+    """Return the part of a container's box within its bottom rails and above their lower edge.
+
+    Only castings are outside. Light reaches the ground between them.
+    """
+    raised = np.array([0.0, 0.0, 0.5 * RING_BOTTOM_MM])
+    inset = np.array([_RAIL_INSET_MM, _RAIL_INSET_MM, 0.0])
+    return replace(box, center_mm=box.center_mm + raised, half_mm=box.half_mm - raised - inset)
 
 
 def clear_radius_mm(ground: Ground, members: Sequence[Member], props: Sequence[Prop]) -> float:
