@@ -15,11 +15,19 @@ from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
 from fastgen.light.surrounding_change import SurroundingLight
 from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.scene import Ground, Prop, Scene
-from fastgen.scene.boxes import rotation_of
+from fastgen.scene.boxes import OrientedBox, rotation_of
 from fastgen.scene.limits import MM
 
 _BESIDE_M = 0.3
 """Distance before the face of a prop at which the ground stands for what is around the face."""
+
+_FOOT_MM = 800.0
+"""The same distance for the sunlight on the ground."""
+
+_FAR_MM = 1e6
+
+_SHEEN = np.float32(0.04)
+"""PROP_SHEEN in shaders/ground_props.glsl."""
 
 _LOWEST, _OPEN_M = 0.55, 0.4
 """Share of the light around it that a prop gets at the ground, and height of the full share."""
@@ -60,11 +68,8 @@ def scene_bodies(
         ambient: Light of its environment.
         ground: Light on its ground; None if it has none.
     """
+    members = list(members)
     bodies = [body for each in members for body in _of_member(each, lens)]
-    if scene.ground is not None and ground is not None:
-        bodies.append(_of_ground(scene.ground, ground))
-        yaw_deg = scene.environment.yaw_deg
-        bodies += [_of_prop(each, scene.ground, ground, ambient, yaw_deg) for each in scene.props]
     suns = [
         DistantLight(
             to_map_frame(sun.direction, -scene.environment.yaw_deg).astype(np.float32),
@@ -72,6 +77,15 @@ def scene_bodies(
         )
         for sun in ambient.lights
     ]
+    if scene.ground is not None and ground is not None:
+        bodies.append(_of_ground(scene.ground, ground))
+        yaw_deg = scene.environment.yaw_deg
+        boxes = [each.member.box for each in members]
+        for prop in scene.props:
+            place, normals = _surface(prop)
+            sunlight = _on_ground(place + _FOOT_MM * normals, scene.ground, suns, boxes)
+            sky = sky_irradiance(ambient, normals + (0.0, 0.0, 0.5), yaw_deg)
+            bodies.append(_of_prop(prop, scene.ground, ground, sky, sunlight))
     return RayBodies(bodies, suns)
 
 
@@ -123,25 +137,59 @@ def _of_ground(ground: Ground, light: GroundLight) -> LitBody:
     )
 
 
+def _surface(prop: Prop) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the vertices [V, 3] of a prop in mm, and their normals [V, 3]."""
+    solid, turn = unit_solid(prop.shape), rotation_of(prop.pose)
+    corners = solid.corners * np.array(prop.size_mm) / 2
+    return corners @ turn.T + np.array(prop.pose.position_mm), solid.normals @ turn.T
+
+
+def _on_ground(
+    place_mm: NDArray[np.float64],
+    ground: Ground,
+    suns: Iterable[DistantLight],
+    boxes: Iterable[OrientedBox],
+) -> NDArray[np.float64]:
+    """Return irradiance / pi [V, 3] of the directional lights on the ground below places [V, 3]."""
+    start = place_mm.copy()
+    start[:, 2] = ground.height_mm
+    found = np.zeros_like(start)
+    for sun in suns:
+        end = start + _FAR_MM * sun.toward
+        hidden = [box.between(start, end) for box in boxes]
+        lit = ~np.any(hidden, axis=0) if hidden else np.ones(len(start), bool)
+        found += lit[:, None] * sun.light * max(float(sun.toward[2]), 0.0)
+    return found
+
+
 def _of_prop(
-    prop: Prop, ground: Ground, light: GroundLight, ambient: Ambient, yaw_deg: float
+    prop: Prop,
+    ground: Ground,
+    light: GroundLight,
+    sky: NDArray[np.floating],
+    sunlight: NDArray[np.float64],
 ) -> LitBody:
     """Return a prop in the light of the sky and the ground around it.
 
-    The numpy twin of prop_color() in shaders/ground_props.glsl, without directional lights.
+    The numpy twin of prop_color() in shaders/ground_props.glsl, except that directional lights do
+    not shine on the prop itself.
+
+    Args:
+        prop: The prop.
+        ground: The ground.
+        light: Light on the ground.
+        sky: Irradiance / pi [V, 3] of the sky at its vertices.
+        sunlight: Irradiance / pi [V, 3] of the directional lights on the ground before them.
     """
-    solid, turn = unit_solid(prop.shape), rotation_of(prop.pose)
-    corners = solid.corners * np.array(prop.size_mm) / 2
-    place = corners @ turn.T + np.array(prop.pose.position_mm)
-    normals = solid.normals @ turn.T
+    place, normals = _surface(prop)
     around = light.at(place[:, :2] * MM + _BESIDE_M * normals[:, :2])
     up = 0.5 + 0.5 * normals[:, 2:]
-    sky = sky_irradiance(ambient, normals + (0.0, 0.0, 0.5), yaw_deg)
-    found = up * around[:, 3:] * sky + (1 - up) * np.array(ground.albedo) * around[:, :3]
+    below = np.array(ground.albedo) * (around[:, :3] + sunlight)
+    found = up * around[:, 3:] * sky + (1 - up) * below
     raised = np.clip((place[:, 2:] - ground.height_mm) * MM / _OPEN_M, 0.0, 1.0)
     return LitBody(
         place.astype(np.float32),
-        solid.triangles.astype(np.uint32),
-        np.broadcast_to(np.array(prop.albedo, np.float32), place.shape),
+        unit_solid(prop.shape).triangles.astype(np.uint32),
+        np.broadcast_to(np.array(prop.albedo, np.float32) + _SHEEN, place.shape),
         (found * (_LOWEST + (1 - _LOWEST) * raised)).astype(np.float32),
     )
