@@ -271,3 +271,9 @@ def test_transforms_that_return_no_pair_are_named():
     with pytest.raises(ConfigError, match="transforms: gave NoneType; return the pair"):
         data[0]
     data.close()
+
+
+@pytest.mark.parametrize("task", ["imdg", "text", "door", "seal"])
+def test_only_the_damage_task_has_pairs(task):
+    with pytest.raises(ConfigError, match=f"pairs: the {task} task does not look for damages"):
+        ContainerDataset(task, items=ItemSettings(pairs=True))

@@ -200,3 +200,42 @@ def test_classes_that_never_occur_are_named():
     with pytest.warns(UserWarning, match="axis, concave, perforation have no label in 5 scenes"):
         weights = class_weights("damage", config, scenes=5)
     assert torch.isfinite(weights).all()
+
+
+DAMAGED = Config.from_values({"damage": {"probability": 1.0, "count": [4, 4]}})
+
+
+def test_a_pair_is_an_image_and_the_same_one_without_damages():
+    (alone, target), sample = view("damage", position=4, config=DAMAGED)
+    ((image, other), (own, without)), _ = view("damage", position=4, config=DAMAGED, pairs=True)
+    assert torch.equal(image, alone)
+    assert own.keys() == target.keys()
+    for name, value in own.items():
+        assert torch.equal(torch.as_tensor(value), torch.as_tensor(target[name])), name
+    with Generator(DAMAGED, seed=2, size=(320, 320)) as generator:
+        whole = generator.render(scene=sample.scene.undamaged(), camera=sample.camera.name)
+    np.testing.assert_array_equal(other.permute(1, 2, 0).numpy(), whole.image)
+    assert without["labels"].tolist() == [1]
+    np.testing.assert_array_equal(without["masks"][0] > 0, whole.damage > 0)
+    assert set(own["labels"].tolist()) > {1}
+
+
+def test_pairs_stay_together_in_batches_and_transforms():
+    def named(images, targets):
+        assert len(images) == len(targets) == 2
+        return images, tuple({**target, "part": part} for part, target in enumerate(targets))
+
+    items = ItemSettings(pairs=True, transforms=named)
+    data = ContainerDataset("damage", DAMAGED, 2, render=RenderSettings(SMALL), items=items)
+    images, targets = next(iter(Loader(data, batch_size=3)))
+    assert len(images) == len(targets) == 6
+    assert [target["part"] for target in targets] == [0, 1] * 3
+    assert [target["image_id"] for target in targets] == [0, 0, 1, 1, 2, 2]
+    data.close()
+    rows = ItemSettings(form="yolo", pairs=True)
+    data = ContainerDataset("damage", DAMAGED, 2, render=RenderSettings(SMALL), items=rows)
+    stacked, found = next(iter(Loader(data, batch_size=3)))
+    data.close()
+    assert torch.equal(stacked, torch.stack(images))
+    assert set(found[found[:, 1] > 0, 0].tolist()) <= {0, 2, 4}
+    assert set(found[found[:, 1] == 0, 0].tolist()) == {0, 1, 2, 3, 4, 5}

@@ -28,7 +28,7 @@ from fastgen.torch.plan import (
     shard,
 )
 from fastgen.torch.rendering import LocalGenerator
-from fastgen.torch.targets import Collate, Item, ItemSettings, check_form, collate_of, item_of
+from fastgen.torch.targets import Collate, Item, ItemSettings, check_items, collate_of, item_of
 from fastgen.validation import whole
 
 MAX_LENGTH = EPOCH_SCENES // 100
@@ -81,7 +81,7 @@ class ContainerDataset(Dataset[Item]):
         self.length = whole("length", length, 1, MAX_LENGTH)
         self.render, self.scenes, self.items = render, scenes, items
         self.cameras = chosen_cameras(task, self.config, scenes.cameras)
-        check_form(task, items.form)
+        check_items(task, items)
         self._generator = LocalGenerator(self.config, self.seed, render)
         self._plan = Plan(self.config, self.seed, self.cameras, scenes)
         # shared memory, so that persistent workers see it change, forked or spawned
@@ -89,7 +89,8 @@ class ContainerDataset(Dataset[Item]):
         self.epoch_settings = 0
         self._taken = torch.zeros(2, dtype=torch.int64).share_memory_()  # items, and if it warned
         self._epoch_config = (0, config_of(scenes.curriculum, self.config, 0))
-        self._scene: tuple[tuple[int, int], Scene] | None = None
+        # epoch and index of the last scene, the scene, and the same without damages
+        self._scenes: tuple[tuple[int, int], Scene, Scene] | None = None
         self._digests: dict[int, str] = {}
         self._environments: dict[str, Any] | None = None
 
@@ -147,7 +148,7 @@ class ContainerDataset(Dataset[Item]):
     @property
     def collate(self) -> Collate:
         """The collate function for this dataset's items. Loader uses it by default."""
-        return collate_of(self.task, self.items.form)
+        return collate_of(self.task, self.items)
 
     def locate(self, position: int, epoch: int | None = None) -> tuple[int, str]:
         """Return scene index and camera name at a position of an epoch, by default the current."""
@@ -155,24 +156,32 @@ class ContainerDataset(Dataset[Item]):
 
     def sample(self, position: int, epoch: int | None = None) -> Sample:
         """Return the Sample from which the item at a position is made."""
-        epoch = self.epoch if epoch is None else epoch
+        return self._sample(position, self.epoch if epoch is None else epoch)
+
+    def _sample(self, position: int, epoch: int, undamaged: bool = False) -> Sample:
         index, camera = self._plan.locate(epoch, position)
         generator = self._generator.get()
-        last = self._scene
+        last = self._scenes
         if last is None or last[0] != (epoch, index):  # a scene's cameras mostly follow each other
             config = self.config_at(epoch)
             scene = sample_scene(config, self.seed, index, generator.environments)
-            last = self._scene = ((epoch, index), scene)
+            whole = scene.undamaged() if self.items.pairs else scene
+            last = self._scenes = ((epoch, index), scene, whole)
         labels = self.config_at(epoch).labels
-        return generator.render(scene=last[1], camera=camera, labels=labels)
+        _, scene, whole = last
+        chosen = whole if undamaged else scene
+        return generator.render(scene=chosen, camera=camera, labels=labels)
 
     def item(self, position: int, epoch: int | None = None) -> Item:
-        """Return image and target at a position, 0 or more, after transforms; see item_of."""
+        """Return image and target at a position, 0 or more, after transforms.
+
+        item_of describes both. With `items.pairs` they are pairs.
+        """
         epoch = self.epoch if epoch is None else epoch
-        sample = self.sample(position, epoch)
-        names = list(self.config.cameras)
-        image_id = sample.scene.index * len(names) + names.index(sample.camera.name)
-        made = item_of(sample, self.task, self.items, self.config_at(epoch).labels, image_id)
+        made = self._made(position, epoch)
+        if self.items.pairs:
+            images, targets = zip(made, self._made(position, epoch, undamaged=True), strict=True)
+            made = images, targets
         if self.items.transforms is None:
             return made
         changed = self.items.transforms(*made)
@@ -181,6 +190,13 @@ class ContainerDataset(Dataset[Item]):
             raise ConfigError(f"transforms: gave {what}; return the pair (image, target)")
         image, target = changed
         return image, target
+
+    def _made(self, position: int, epoch: int, undamaged: bool = False) -> Item:
+        """Return a single image and its target, without transforms."""
+        sample = self._sample(position, epoch, undamaged)
+        names = list(self.config.cameras)
+        image_id = sample.scene.index * len(names) + names.index(sample.camera.name)
+        return item_of(sample, self.task, self.items, self.config_at(epoch).labels, image_id)
 
     def begin_count(self) -> None:
         """Count items anew, because a sampler begins a pass."""

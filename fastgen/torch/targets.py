@@ -6,6 +6,8 @@ yolo.detections, text_crops and door_class.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -52,6 +54,9 @@ class ItemSettings:
             class and normalized box.
         as_float: Images are float32 in 0..1 instead of uint8.
         transforms: Called with image and target as `item_of` makes them. Returns both, changed.
+            With `pairs` it is called with two images and two targets.
+        pairs: For the damage task: an item is an image and its counterpart without damages, from
+            the same camera in the same light. Its target is the pair of their targets.
 
     Raises:
         ConfigError: A value is not valid.
@@ -60,6 +65,7 @@ class ItemSettings:
     form: str = FORMS[0]
     as_float: bool = False
     transforms: Callable[[Any, Any], Item] | None = None
+    pairs: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -92,10 +98,12 @@ def class_names(task: str, config: Config | None = None) -> tuple[str, ...]:
     return _NAMES[task]
 
 
-def check_form(task: str, form: str) -> None:
-    """Raise ConfigError if a task has no targets of this form."""
-    if form == "yolo" and task not in ("damage", "imdg"):
+def check_items(task: str, items: ItemSettings) -> None:
+    """Raise ConfigError if a task has no targets of this form, or no pairs."""
+    if items.form == "yolo" and task not in ("damage", "imdg"):
         raise ConfigError(f"form: 'yolo' is for boxes, and the {task} task has none; leave it out")
+    if items.pairs and task != "damage":
+        raise ConfigError(f"pairs: the {task} task does not look for damages; leave it out")
 
 
 def image_tensor(pixels: NDArray[np.uint8], as_float: bool = False) -> torch.Tensor:
@@ -197,12 +205,22 @@ def collate_seal(batch: Sequence[Item]) -> tuple[list[torch.Tensor], torch.Tenso
     return crops, torch.cat([target["labels"] for _, target in batch])
 
 
-def collate_of(task: str, form: str) -> Collate:
+def collate_pairs(collate: Collate, batch: Sequence[Item]) -> Any:
+    """Collate pairs as if all their images were items, each damaged one before its counterpart.
+
+    Args:
+        collate: Collates single items.
+        batch: Pairs of images, each with the pair of their targets.
+    """
+    pairs = (zip(images, targets, strict=True) for images, targets in batch)
+    return collate(list(chain.from_iterable(pairs)))
+
+
+def collate_of(task: str, items: ItemSettings) -> Collate:
     """Return the collate function for the items of a task."""
-    if form == "yolo":
-        return collate_yolo
-    own = {"text": collate_text, "door": collate_door, "seal": collate_seal}
-    return own.get(task, collate_lists)
+    own: dict[str, Collate] = {"text": collate_text, "door": collate_door, "seal": collate_seal}
+    single = collate_yolo if items.form == "yolo" else own.get(task, collate_lists)
+    return partial(collate_pairs, single) if items.pairs else single
 
 
 _Found = tuple[int, Box, int, NDArray[np.bool_] | None]
