@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import torch
 from common.boxes import generalized_iou, iou
-from common.data import Feed, rendered
+from common.data import Feed, Kept, rendered
 from common.detection_metrics import confusion, hits, operating_point, score
 from common.detector import STRIDE, Detector, distinct, gaussians
 from common.run import Table
 from pycocotools import mask as coco_mask
 
-from fastgen.torch import ContainerDataset, RenderSettings, SceneSettings
+from fastgen.torch import ContainerDataset, ItemSettings, RenderSettings, SceneSettings
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("container", "axis", "dented")
@@ -257,8 +257,33 @@ def test_cached_items_equal_those_of_the_dataset_and_are_read_back(tmp_path):
     data.close()
 
 
+def test_cached_pairs_stay_together_in_every_batch(tmp_path):
+    config = damage.Config.from_values(damage.MANY_DAMAGES)
+    size = RenderSettings((64, 64))
+    data = ContainerDataset("damage", config, 2, 3, size, items=ItemSettings(pairs=True))
+    made = rendered(data, tmp_path)
+    single = rendered(ContainerDataset("damage", config, 2, 3, size), tmp_path)
+    assert len(made) == len(single) == 3
+    for (images, targets), (image, target) in zip(made, single, strict=True):
+        assert (images[0] == image).all()
+        assert (targets[0]["masks"] == target["masks"]).all()
+        assert targets[1]["labels"].tolist() == [1]
+    assert any((images[0] != images[1]).any() for images, _ in made)
+    for images, targets in Feed(made, 2, seed=1).passed(0):
+        numbers = [target["image_id"] for target in targets]
+        assert len(images) == len(targets)
+        assert numbers[::2] == numbers[1::2]
+
+
 def test_order_of_batches_depends_on_seed_and_pass():
-    items = list(zip(torch.arange(9), range(9), strict=True))
+    class Numbers(Kept):
+        def __len__(self):
+            return 9
+
+        def __getitem__(self, position):
+            return position, position
+
+    items = Numbers([])
 
     def order(seed, number):
         return [k for _, targets in Feed(items, 2, seed).passed(number) for k in targets]

@@ -4,6 +4,7 @@ import hashlib
 import json
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from torch.utils.data import DataLoader, Dataset
 import fastgen
 from fastgen.files.images import jpeg
 from fastgen.torch import ContainerDataset, Loader, collate_lists
+from fastgen.torch.targets import collate_pairs
 
 Batch = tuple[list[torch.Tensor], list[Any]]
 """Images, uint8 [3, H, W] each, and one target per image."""
@@ -26,26 +28,29 @@ class Kept(Dataset[Any]):
     """Items made by `rendered`: an image uint8 [3, H, W] and the dataset's target.
 
     A text item is one crop with a dict of its text and parts. A seal item is one crop with a dict
-    of its label, hasp and image_id.
+    of its label, hasp and image_id. The items of a dataset with pairs are pairs.
+
+    Attributes:
+        collate: Collates items to lists of images and targets.
     """
 
-    def __init__(self, items: list[dict[str, Any]]) -> None:
-        self._items = items
+    def __init__(self, items: list[Any], pairs: bool = False) -> None:
+        self._items, self._pairs = items, pairs
+        self.collate: Any = partial(collate_pairs, collate_lists) if pairs else collate_lists
 
     def __len__(self) -> int:
         return len(self._items)
 
-    def __getitem__(self, position: int) -> tuple[torch.Tensor, Any]:
+    def __getitem__(self, position: int) -> tuple[Any, Any]:
         item = self._items[position]
-        pixels = simplejpeg.decode_jpeg(item["jpeg"].numpy().tobytes())
-        target = item["target"]
-        if isinstance(target, dict) and "masks" in target:
-            target = {**target, "masks": _unpacked(target["masks"], pixels.shape[:2])}
-        return torch.from_numpy(pixels.transpose(2, 0, 1).copy()), target
+        if not self._pairs:
+            return _unpacked(item)
+        images, targets = zip(*map(_unpacked, item), strict=True)
+        return images, targets
 
     def with_more(self, other: "Kept") -> "Kept":
         """Return these items followed by those of another."""
-        return Kept(self._items + other._items)
+        return Kept(self._items + other._items, self._pairs)
 
 
 def rendered(data: ContainerDataset, folder: Path) -> Kept:
@@ -54,12 +59,13 @@ def rendered(data: ContainerDataset, folder: Path) -> Kept:
     The name of the file is a hash of everything that affects the items, so stale files are not
     used.
     """
-    told = json.dumps([fastgen.__version__, data.epoch, data.description], sort_keys=True)
+    paired = data.items.pairs
+    told = json.dumps([fastgen.__version__, data.epoch, data.description, paired], sort_keys=True)
     path = folder / f"{data.task}_{hashlib.sha256(told.encode()).hexdigest()[:12]}.pt"
     if path.exists():
-        return Kept(torch.load(path, weights_only=True))
+        return Kept(torch.load(path, weights_only=True), paired)
     folder.mkdir(parents=True, exist_ok=True)
-    items: list[dict[str, Any]] = []
+    items: list[Any] = []
     start = reported = time.perf_counter()
     for position in range(len(data)):
         image, target = data[position]
@@ -71,8 +77,10 @@ def rendered(data: ContainerDataset, folder: Path) -> Kept:
             for crop, (label, hasp) in zip(image, facts, strict=True):
                 fact = {"label": label, "hasp": hasp, "image_id": target["image_id"]}
                 items.append({"jpeg": _jpeg(crop), "target": fact})
+        elif paired:
+            items.append([_packed(*each) for each in zip(image, target, strict=True)])
         else:
-            items.append({"jpeg": _jpeg(image), "target": _packed(target)})
+            items.append(_packed(image, target))
         if (now := time.perf_counter()) - reported > _REPORT_S:
             reported = now
             rate = (position + 1) / (now - start)
@@ -81,7 +89,7 @@ def rendered(data: ContainerDataset, folder: Path) -> Kept:
     aside = path.with_suffix(".part")
     torch.save(items, aside)
     aside.rename(path)
-    return Kept(items)
+    return Kept(items, paired)
 
 
 class Feed:
@@ -94,7 +102,9 @@ class Feed:
         workers: Processes that render. Other items are read in this process.
     """
 
-    def __init__(self, source: Dataset[Any], batch: int, seed: int, workers: int = 0) -> None:
+    def __init__(
+        self, source: Kept | ContainerDataset, batch: int, seed: int, workers: int = 0
+    ) -> None:
         self._order = torch.Generator()
         self._seed = seed
         self._loader: Any
@@ -103,11 +113,11 @@ class Feed:
             if workers:
                 # a process that uses CUDA or OpenGL must not be forked
                 options |= {"persistent_workers": True, "multiprocessing_context": "spawn"}
-            collate = _COLLATES.get(source.task, collate_lists)
+            collate = _COLLATES.get(source.task)
             self._loader = Loader(source, batch, shuffle=True, collate_fn=collate, **options)
         else:
             self._loader = DataLoader(
-                source, batch, shuffle=True, collate_fn=collate_lists, generator=self._order
+                source, batch, shuffle=True, collate_fn=source.collate, generator=self._order
             )
 
     def __len__(self) -> int:
@@ -132,13 +142,13 @@ def collate_texts(batch: Sequence[Any]) -> Batch:
     return crops, facts
 
 
-_COLLATES: dict[str, Any] = {"text": collate_texts, "seal": None}
-"""Collate functions by task; None for the dataset's own, whose targets are labels."""
+_COLLATES: dict[str, Any] = {"text": collate_texts, "door": collate_lists}
+"""Collate functions by task; others use the dataset's own."""
 
 
-def in_order(source: Dataset[Any], batch: int) -> Iterator[Batch]:
+def in_order(source: Kept, batch: int) -> Iterator[Batch]:
     """Return batches of the items in their order, each item once."""
-    return iter(DataLoader(source, batch, collate_fn=collate_lists))
+    return iter(DataLoader(source, batch, collate_fn=source.collate))
 
 
 def _jpeg(image: torch.Tensor) -> torch.Tensor:
@@ -146,15 +156,21 @@ def _jpeg(image: torch.Tensor) -> torch.Tensor:
     return torch.frombuffer(bytearray(data), dtype=torch.uint8)
 
 
-def _packed(target: Any) -> Any:
-    if not isinstance(target, dict) or "masks" not in target:
-        return target
-    masks = target["masks"].numpy()
-    bits = np.packbits(masks.reshape(len(masks), -1), axis=1)
-    return {**target, "masks": torch.from_numpy(bits)}
+def _packed(image: torch.Tensor, target: Any) -> dict[str, Any]:
+    """Return a JPEG file of an image, and its target with masks as bits."""
+    if isinstance(target, dict) and "masks" in target:
+        masks = target["masks"].numpy()
+        bits = np.packbits(masks.reshape(len(masks), -1), axis=1)
+        target = {**target, "masks": torch.from_numpy(bits)}
+    return {"jpeg": _jpeg(image), "target": target}
 
 
-def _unpacked(bits: torch.Tensor, shape: tuple[int, int]) -> torch.Tensor:
-    height, width = shape
-    masks = np.unpackbits(bits.numpy(), axis=1, count=height * width)
-    return torch.from_numpy(masks.reshape(-1, height, width))
+def _unpacked(item: dict[str, Any]) -> tuple[torch.Tensor, Any]:
+    """Return image and target of what `_packed` made."""
+    pixels = simplejpeg.decode_jpeg(item["jpeg"].numpy().tobytes())
+    target = item["target"]
+    if isinstance(target, dict) and "masks" in target:
+        height, width = pixels.shape[:2]
+        masks = np.unpackbits(target["masks"].numpy(), axis=1, count=height * width)
+        target = {**target, "masks": torch.from_numpy(masks.reshape(-1, height, width))}
+    return torch.from_numpy(pixels.transpose(2, 0, 1).copy()), target

@@ -18,7 +18,7 @@ from common.boxes import generalized_iou, iou
 from common.run import Learner
 
 STRIDE = 4
-"""Image pixels per cell of the maps. The sides of an image must be multiples of 32."""
+"""Image pixels per cell of the maps. The sides of an image must be multiples of 64."""
 
 _SPREAD = 0.09  # Gaussian's sigma per side of the box; TTFNet's alpha 0.54, over 6
 _LEAST_SPREAD = 0.3  # cells
@@ -61,7 +61,8 @@ class Detector(Learner):
     def __init__(self, classes: int, width: int = 32, blocks: int = 1, masks: bool = False) -> None:
         super().__init__()
         self.classes, self.masks = classes, masks
-        widths = [width, 2 * width, 3 * width, 4 * width]
+        # with five levels a cell sees 670 pixels: a container may fill the image
+        widths = [width, 2 * width, 3 * width, 4 * width, 4 * width]
         self.stem = nn.Sequential(_conv(3, width // 2, 2), _conv(width // 2, width, 2))
         levels, sides = [], [nn.Conv2d(width, width, 1)]
         for before, after in itertools.pairwise(widths):
@@ -75,23 +76,29 @@ class Detector(Learner):
         self.mask = nn.Conv2d(width * 3 // 2, 2, 1) if masks else None
         assert self.heat.bias is not None
         nn.init.constant_(self.heat.bias, -math.log(1 / _RARE - 1))
+        nn.utils.convert_conv2d_weight_memory_format(self, torch.channels_last)
 
     def forward(self, pixels: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        """Run the network on images [B, 3, H, W] in -1..1.
+        """Run the network on images float32 [B, 3, H, W] in -1..1.
+
+        Where the processor is fast at bfloat16, all layers but the last ones compute in it. On a
+        CPU with AVX512-BF16, a training step then takes a third of the time.
 
         Returns:
-            Maps at a quarter of the image size: heat logits [B, classes, h, w], logarithms of the
-            distances to the four sides in cells for both groups [B, 2, 4, h, w], and mask
+            Float32 maps at a quarter of the image size: heat logits [B, classes, h, w], logarithms
+            of the distances to the four sides in cells for both groups [B, 2, 4, h, w], and mask
             logits [B, 2, h, w] if the detector has masks.
         """
-        x = self.stem(pixels)
-        seen = [x]
-        for level in self.levels:
-            seen.append(x := level(x))
-        merged = self.sides[-1](seen[-1])
-        for finer, side in zip(seen[-2::-1], list(self.sides)[-2::-1], strict=True):
-            merged = side(finer) + functional.interpolate(merged, scale_factor=2.0)
-        features = self.fuse(functional.relu(merged))
+        with torch.autocast(pixels.device.type, torch.bfloat16, enabled=_fast_bfloat16(pixels)):
+            x = self.stem(pixels.contiguous(memory_format=torch.channels_last))
+            seen = [x]
+            for level in self.levels:
+                seen.append(x := level(x))
+            merged = self.sides[-1](seen[-1])
+            for finer, side in zip(seen[-2::-1], list(self.sides)[-2::-1], strict=True):
+                merged = side(finer) + functional.interpolate(merged, scale_factor=2.0)
+            features = self.fuse(functional.relu(merged))
+        features = features.float()  # peaks of heat would tie in bfloat16
         maps = [self.heat(features), self.box(features).unflatten(1, (2, 4))]
         return (*maps, self.mask(features)) if self.mask is not None else tuple(maps)
 
@@ -172,6 +179,13 @@ class Detector(Learner):
         shared = (shares * wanted).sum((0, 2, 3))
         sizes = shares.sum((0, 2, 3)) + wanted.sum((0, 2, 3))
         return _MASK_WEIGHT * (crossed + (1 - (2 * shared + 1) / (sizes + 1)).mean())
+
+
+def _fast_bfloat16(pixels: torch.Tensor) -> bool:
+    """Return whether the device of a tensor multiplies bfloat16 numbers faster than float32."""
+    if pixels.device.type == "cuda":
+        return bool(torch.cuda.is_bf16_supported(including_emulation=False))
+    return bool(torch.cpu.get_capabilities().get("avx512_bf16"))
 
 
 def gaussians(boxes: torch.Tensor, shape: torch.Size) -> torch.Tensor:
