@@ -2,45 +2,46 @@
 
     python examples/damage.py [--full]
 
-Also reports recall for small and for thin damages. Needs fastgen[examples]. The CPU version trains
-a small detector of its own on the end cameras at 320x320. Its training images have more damages
-than the test images. --full trains a wider one on all cameras at 640x640 on a GPU while workers
-render.
+Also reports how large a damage must be, and how much it must change the image, to be found. Needs
+fastgen[examples]. A batch has pairs of images with and without damages. The CPU version trains a
+small detector of its own on the end cameras; its training images have more damages than the test
+images. --full trains a wider one on all cameras on a GPU while workers render.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-import cv2
-import numpy as np
 from common import charts, drawing
+from common.damage_recall import Outcome, changes, recall_tables
 from common.data import Kept, in_order, rendered
-from common.detection_metrics import Found, Scores, hits, operating_point, score
+from common.detection_metrics import Scores, operating_point, score
 from common.detector import Detector
 from common.run import Plan, Run, Table, conclude, feed_of, parameters, start, train
 
 from fastgen import Config
 from fastgen.classes import SEGMENTATION_CLASSES
-from fastgen.torch import ContainerDataset, RenderSettings, SceneSettings
+from fastgen.torch import ContainerDataset, ItemSettings, RenderSettings, SceneSettings
 
 PLANS = {
-    "cpu": Plan(images=3500, test_images=600, size=(320, 320), batch=4, passes=3, rate=1.5e-3),
+    "cpu": Plan(images=4000, test_images=600, size=(640, 640), batch=4, passes=2, rate=2e-3),
     "full": Plan(
-        images=7910, test_images=2480, size=(640, 640), batch=16, passes=20, rate=1e-3, workers=12
+        images=7910, test_images=2480, size=(640, 640), batch=8, passes=20, rate=1e-3, workers=12
     ),
     "smoke": Plan(images=4, test_images=8, size=(128, 128), batch=2, passes=1, rate=1e-3),
 }
+"""Sizes of runs. The images and batches of training are pairs."""
 
 MANY_DAMAGES = {
-    "damage": {"probability": 1.0, "count": [2, 6], "faces": ["door", "no_door"]},
+    "damage": {
+        "probability": 1.0,
+        "count": [2, 6],
+        "faces": ["door", "no_door"],
+        "toward_cameras": 1.0,
+    },
 }
-"""Damages on every container, on the faces that the end cameras see, for the CPU version."""
+"""Damages on every container, where the end cameras see them."""
 
-SMALL_PX = 32 * 32
-"""Visible pixels below which COCO calls an object small."""
-
-THIN = 3.0
-"""Smallest length-to-width ratio of a thin damage, from its minimum-area rectangle."""
+_DAMAGED_SHARE = 2
+"""Test images of the preset for each test image with many damages."""
 
 PAPER = {
     "box": {"AP": 71.5, "AP50": 89.9, "AP75": 79.2, "AP_S": 12.5, "AP_M": 50.3, "AP_L": 77.8}
@@ -52,82 +53,35 @@ PAPER = {
 
 
 def training_data(run: Run) -> ContainerDataset:
-    """Return the preset's images of all cameras; on a CPU, images of the ends with many damages."""
-    plan = run.plan
-    config = Config.preset() if run.full else Config.from_values(MANY_DAMAGES)
-    cameras = None if run.full else ("Cl", "Cr")
-    return ContainerDataset(
-        "damage",
-        config,
-        run.seed,
-        plan.images,
-        render=RenderSettings(plan.size),
-        scenes=SceneSettings(cameras, split="train"),
-    )
+    """Return pairs with and without damages: of all cameras of the preset, or of damaged ends."""
+    return _data(run, run.plan.images, "train", damaged=not run.full, pairs=True)
 
 
 def test_data(run: Run) -> Kept:
     """Return the preset's images of test scenes, from the same cameras as the training images."""
-    plan = run.plan
-    cameras = None if run.full else ("Cl", "Cr")
-    data = ContainerDataset(
+    return rendered(_data(run, run.plan.test_images, "test"), run.cache)
+
+
+def damaged_data(run: Run) -> Kept:
+    """Return pairs of test scenes with many damages, which show what makes a damage visible."""
+    count = run.plan.test_images // _DAMAGED_SHARE
+    return rendered(_data(run, count, "test", damaged=True, pairs=True), run.cache)
+
+
+def _data(
+    run: Run, length: int, split: str, damaged: bool = False, pairs: bool = False
+) -> ContainerDataset:
+    return ContainerDataset(
         "damage",
-        seed=run.seed,
-        length=plan.test_images,
-        render=RenderSettings(plan.size),
-        scenes=SceneSettings(cameras, split="test", fixed=True),
+        Config.from_values(MANY_DAMAGES) if damaged else Config.preset(),
+        run.seed,
+        length,
+        render=RenderSettings(run.plan.size),
+        scenes=SceneSettings(
+            None if run.full else ("Cl", "Cr"), split=split, fixed=split == "test"
+        ),
+        items=ItemSettings(pairs=pairs),
     )
-    return rendered(data, run.cache)
-
-
-def slenderness(mask: np.ndarray) -> float:
-    """Return the length-to-width ratio of the minimum-area rectangle around a mask [H, W]."""
-    rows, columns = np.nonzero(mask)
-    points = np.stack([columns, rows], axis=1).astype(np.float32)
-    # plus one, because pixels have a size: a row of n pixels has the ratio n
-    sides = np.array(cv2.minAreaRect(points)[1]) + 1
-    return float(sides.max() / sides.min())
-
-
-def groups_of(target: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Return for each kind of damage which labels of an image belong to it, bool [N] by name."""
-    labels = target["labels"].numpy()
-    damages = labels > 1
-    small = damages & (target["area"].numpy() < SMALL_PX)
-    slender = np.array([slenderness(mask) >= THIN for mask in target["masks"].numpy()], bool)
-    kinds = {name: labels == k for k, name in enumerate(SEGMENTATION_CLASSES, start=1) if k > 1}
-    thin = damages & slender
-    sorts = {"small": small, "larger": damages & ~small, "thin": thin, "not thin": damages & ~thin}
-    return {"all damages": damages, **kinds, **sorts, "small and thin": small & thin}
-
-
-def recall_table(
-    targets: Sequence[Mapping[str, Any]], found: Sequence[Found], least: float
-) -> Table:
-    """Return how many damages of each kind are found, by box and by mask.
-
-    Args:
-        targets: Labels by image, in the loader's detection form.
-        found: Detections by image.
-        least: Smallest score that counts.
-    """
-    tally: dict[str, np.ndarray] = {}
-    for target, each in zip(targets, found, strict=True):
-        boxes, masks = hits(target, each, least), hits(target, each, least, masks=True)
-        for name, chosen in groups_of(target).items():
-            counted = np.array([chosen.sum(), boxes[chosen].sum(), masks[chosen].sum()])
-            tally[name] = tally.get(name, 0) + counted
-    rows = [
-        [
-            name,
-            int(n),
-            100 * by_box / n if n else float("nan"),
-            100 * by_mask / n if n else float("nan"),
-        ]
-        for name, (n, by_box, by_mask) in tally.items()
-    ]
-    title = f"Damages found at an IoU of 0.5 and a score of {least:.2f}, %"
-    return Table(title, ["damages", "labels", "by box", "by mask"], rows)
 
 
 def summary_table(kind: str, scores: Scores) -> Table:
@@ -149,6 +103,15 @@ def class_table(boxes: Scores, masks: Scores) -> Table:
     ]
     heads = ["class", "labels", "box AP50", "box AP", "mask AP50", "mask AP"]
     return Table("By class, %", heads, rows)
+
+
+def tested(model: Detector, pairs: Kept) -> list[Outcome]:
+    """Return labels and detections of the damaged images of pairs."""
+    found = []
+    for k in range(len(pairs)):
+        images, (target, _) = pairs[k]
+        found.append(Outcome(target, model.predict([images[0]])[0], changes(images, target)))
+    return found
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -180,7 +143,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         summary_table("box", boxes),
         summary_table("mask", masks),
         class_table(boxes, masks),
-        recall_table(targets, found, least),
+        *recall_tables(tested(model, damaged_data(run)), least),
     ]
     more = {"parameters": parameters(model), "score": least, "last_loss": losses[-1]}
     conclude(run, tables, {"box": boxes.summary, "mask": masks.summary, **more})

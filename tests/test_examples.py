@@ -231,16 +231,6 @@ def test_precision_and_recall_of_doors():
     assert np.isnan(door.precision_recall(is_door, none)[0])
 
 
-def test_slenderness_of_a_tilted_bar_is_its_length_over_its_width():
-    y, x = np.mgrid[:200, :200] - 100.0
-    along, across = 0.8 * x + 0.6 * y, 0.8 * y - 0.6 * x
-    bar = (abs(along) < 60) & (abs(across) < 10)
-    assert damage.slenderness(bar) == pytest.approx(6, rel=0.05)
-    square = np.zeros((9, 9), np.uint8)
-    square[2:6, 3:7] = 1
-    assert damage.slenderness(square) == pytest.approx(1)
-
-
 def test_cached_items_equal_those_of_the_dataset_and_are_read_back(tmp_path):
     config = damage.Config.from_values(damage.MANY_DAMAGES)
     data = ContainerDataset("damage", config, seed=2, length=4, render=RenderSettings((96, 64)))
