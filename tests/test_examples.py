@@ -12,6 +12,7 @@ import door
 import numpy as np
 import pytest
 import torch
+from common import detector
 from common.boxes import generalized_iou, iou
 from common.data import Feed, Kept, rendered
 from common.detection_metrics import confusion, hits, operating_point, score
@@ -263,6 +264,20 @@ def test_cached_pairs_stay_together_in_every_batch(tmp_path):
         numbers = [target["image_id"] for target in targets]
         assert len(images) == len(targets)
         assert numbers[::2] == numbers[1::2]
+
+
+def test_maps_in_bfloat16_are_close_to_those_in_float32(monkeypatch):
+    torch.manual_seed(3)
+    model = Detector(5, masks=True).eval()
+    pixels = torch.rand(1, 3, 128, 192) * 2 - 1
+    maps = {}
+    for fast in (False, True):
+        monkeypatch.setattr(detector, "_fast_bfloat16", lambda _, fast=fast: fast)
+        with torch.no_grad():
+            maps[fast] = model(pixels)
+    for exact, close in zip(maps[False], maps[True], strict=True):
+        assert exact.dtype == close.dtype == torch.float32
+        assert 0 < (exact - close).abs().max() < 0.1 * exact.std()
 
 
 def test_order_of_batches_depends_on_seed_and_pass():
