@@ -3,12 +3,15 @@
     python examples/damage.py [--full]
 
 Also reports how large a damage must be, and how much it must change the image, to be found. Needs
-fastgen[examples]. A batch has pairs of images with and without damages. The CPU version trains a
-small detector of its own on the end cameras; its training images have more damages than the test
-images. --full trains a wider one on all cameras on a GPU while workers render.
+fastgen[examples]. A small detector of its own learns from pairs of images with and without damages:
+first from near views, then from whole ones. The CPU version trains and tests on the end cameras;
+its training images have more damages than the test images. --full trains a wider detector on all
+cameras on a GPU while workers render.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 from common import charts, drawing
 from common.damage_recall import Outcome, changes, recall_tables
@@ -22,15 +25,24 @@ from fastgen.classes import SEGMENTATION_CLASSES
 from fastgen.torch import ContainerDataset, ItemSettings, RenderSettings, SceneSettings
 
 PLANS = {
-    "cpu": Plan(images=4000, test_images=600, size=(640, 640), batch=4, passes=2, rate=2e-3),
+    "cpu": Plan(images=1200, test_images=600, size=(640, 640), batch=4, passes=1, rate=1e-3),
     "full": Plan(
         images=7910, test_images=2480, size=(640, 640), batch=8, passes=20, rate=1e-3, workers=12
     ),
     "smoke": Plan(images=4, test_images=8, size=(128, 128), batch=2, passes=1, rate=1e-3),
 }
-"""Sizes of runs. The images and batches of training are pairs."""
+"""Sizes of runs, for whole images. Images and batches of training are pairs."""
 
-MANY_DAMAGES = {
+NEAR_PLANS = {
+    "cpu": Plan(images=6000, test_images=0, size=(256, 256), batch=16, passes=6, rate=2e-3),
+    "full": Plan(
+        images=20_000, test_images=0, size=(256, 256), batch=32, passes=20, rate=2e-3, workers=12
+    ),
+    "smoke": Plan(images=4, test_images=0, size=(64, 64), batch=2, passes=1, rate=1e-3),
+}
+"""Sizes of runs, for near views."""
+
+MANY_DAMAGES: dict[str, dict[str, Any]] = {
     "damage": {
         "probability": 1.0,
         "count": [2, 6],
@@ -39,6 +51,23 @@ MANY_DAMAGES = {
     },
 }
 """Damages on every container, where the end cameras see them."""
+
+NEAR_VIEWS: dict[str, dict[str, Any]] = {
+    "damage": {**MANY_DAMAGES["damage"], "count": [5, 9]},
+    "cameras": {
+        f"{face}_{number}": {
+            "face": face,
+            "focal_mm": 112.5,  # as many pixels per mm in 256 pixels as 45 mm in 640
+            "distance_mm": [4600, 7200],
+            "aim_right": [-0.9, 0.9],
+            "aim_up": [-0.9, 0.9],
+        }
+        for face in ("door", "no_door")
+        for number in range(3)
+    },
+}
+"""Cameras that see parts of the ends at the scale of the preset's end cameras. They show several times
+as many damages per pixel as whole images."""
 
 _DAMAGED_SHARE = 2
 """Test images of the preset for each test image with many damages."""
@@ -52,34 +81,47 @@ PAPER = {
 """Results of Cascade Mask R-CNN, Tables 4 to 7."""
 
 
+def near_data(run: Run) -> ContainerDataset:
+    """Return pairs of near views."""
+    config = Config.from_values(NEAR_VIEWS)
+    return _data(run, config, run.plan.images, SceneSettings(split="train"), pairs=True)
+
+
 def training_data(run: Run) -> ContainerDataset:
     """Return pairs with and without damages: of all cameras of the preset, or of damaged ends."""
-    return _data(run, run.plan.images, "train", damaged=not run.full, pairs=True)
+    config = Config.preset() if run.full else Config.from_values(MANY_DAMAGES)
+    scenes = SceneSettings(_cameras(run), split="train")
+    return _data(run, config, run.plan.images, scenes, pairs=True)
 
 
 def test_data(run: Run) -> Kept:
     """Return the preset's images of test scenes, from the same cameras as the training images."""
-    return rendered(_data(run, run.plan.test_images, "test"), run.cache)
+    scenes = SceneSettings(_cameras(run), split="test", fixed=True)
+    return rendered(_data(run, Config.preset(), run.plan.test_images, scenes), run.cache)
 
 
 def damaged_data(run: Run) -> Kept:
     """Return pairs of test scenes with many damages, which show what makes a damage visible."""
+    config = Config.from_values(MANY_DAMAGES)
+    scenes = SceneSettings(_cameras(run), split="test", fixed=True)
     count = run.plan.test_images // _DAMAGED_SHARE
-    return rendered(_data(run, count, "test", damaged=True, pairs=True), run.cache)
+    return rendered(_data(run, config, count, scenes, pairs=True), run.cache)
+
+
+def _cameras(run: Run) -> tuple[str, ...] | None:
+    return None if run.full else ("Cl", "Cr")
 
 
 def _data(
-    run: Run, length: int, split: str, damaged: bool = False, pairs: bool = False
+    run: Run, config: Config, length: int, scenes: SceneSettings, pairs: bool = False
 ) -> ContainerDataset:
     return ContainerDataset(
         "damage",
-        Config.from_values(MANY_DAMAGES) if damaged else Config.preset(),
+        config,
         run.seed,
         length,
         render=RenderSettings(run.plan.size),
-        scenes=SceneSettings(
-            None if run.full else ("Cl", "Cr"), split=split, fixed=split == "test"
-        ),
+        scenes=scenes,
         items=ItemSettings(pairs=pairs),
     )
 
@@ -118,10 +160,14 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Train, test, and write the results."""
     run = start("damage", __doc__ or "", PLANS, argv)
     plan = run.plan
-    feed = feed_of(training_data(run), run)
     shape = {"width": 96, "blocks": 3} if run.full else {"width": 32, "blocks": 1}
     model = Detector(len(SEGMENTATION_CLASSES), masks=True, **shape)
-    losses = train(model, feed, run)
+    losses = []
+    for stage, data_of in (
+        (replace(run, plan=NEAR_PLANS[run.mode]), near_data),
+        (run, training_data),
+    ):
+        losses += train(model, feed_of(data_of(stage), stage), stage)
 
     test = test_data(run)
     targets = [test[i][1] for i in range(len(test))]
