@@ -66,8 +66,8 @@ NEAR_VIEWS: dict[str, dict[str, Any]] = {
         for number in range(3)
     },
 }
-"""Cameras that see parts of the ends at the scale of the preset's end cameras. They show several times
-as many damages per pixel as whole images."""
+"""Parts of the ends at the scale of the preset's end cameras. Near views show several times as many
+damages per pixel as whole images."""
 
 _DAMAGED_SHARE = 2
 """Test images of the preset for each test image with many damages."""
@@ -162,12 +162,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     plan = run.plan
     shape = {"width": 96, "blocks": 3} if run.full else {"width": 32, "blocks": 1}
     model = Detector(len(SEGMENTATION_CLASSES), masks=True, **shape)
-    losses = []
-    for stage, data_of in (
-        (replace(run, plan=NEAR_PLANS[run.mode]), near_data),
-        (run, training_data),
-    ):
-        losses += train(model, feed_of(data_of(stage), stage), stage)
+    near = replace(run, plan=NEAR_PLANS[run.mode])
+    losses = train(model, feed_of(near_data(near), near), near)
+    losses += train(model, feed_of(training_data(run), run), run)
 
     test = test_data(run)
     targets = [test[i][1] for i in range(len(test))]
