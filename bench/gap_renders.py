@@ -43,7 +43,7 @@ class Effort:
     marker_steps: int = 700
     reader_steps: int = 900
     damage_steps: int = 1500
-    box_steps: int = 1500
+    box_steps: int = 4000
 
 
 class Renders:
