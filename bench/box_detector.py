@@ -49,7 +49,6 @@ def fit_detector(images: Sequence[BoxedImage], steps: int, seed: int) -> Detecto
     """
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    # with one block, a cell sees less than a container that fills the image
     model = Detector(len(_NAMES), blocks=2)
 
     def loss() -> torch.Tensor:

@@ -4,13 +4,13 @@
 
 Also reports how large a damage must be, and how much it must change the image, to be found. Needs
 fastgen[examples]. A small detector of its own learns from pairs of images with and without damages:
-first from near views, then from whole ones. The CPU version trains and tests on the end cameras;
-its training images have more damages than the test images. --full trains a wider detector on all
-cameras on a GPU while workers render.
+first from near views of the ends, then from whole images. All training images have damages, the
+test images as many as the preset. The CPU version uses the end cameras. --full trains a wider
+detector on a GPU while workers render, after the near views with all cameras.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from common import charts, drawing
@@ -31,7 +31,7 @@ PLANS = {
     ),
     "smoke": Plan(images=4, test_images=8, size=(128, 128), batch=2, passes=1, rate=1e-3),
 }
-"""Sizes of runs, for whole images. Images and batches of training are pairs."""
+"""Sizes of runs, for whole images. `images` and `batch` count pairs in training."""
 
 NEAR_PLANS = {
     "cpu": Plan(images=6000, test_images=0, size=(256, 256), batch=16, passes=6, rate=2e-3),
@@ -50,7 +50,7 @@ MANY_DAMAGES: dict[str, dict[str, Any]] = {
         "toward_cameras": 1.0,
     },
 }
-"""Damages on every container, where the end cameras see them."""
+"""Damages on the ends of every container, where cameras see them."""
 
 NEAR_VIEWS: dict[str, dict[str, Any]] = {
     "damage": {**MANY_DAMAGES["damage"], "count": [5, 9]},
@@ -69,8 +69,10 @@ NEAR_VIEWS: dict[str, dict[str, Any]] = {
 """Parts of the ends at the scale of the preset's end cameras. Near views show several times as many
 damages per pixel as whole images."""
 
-_DAMAGED_SHARE = 2
-"""Test images of the preset for each test image with many damages."""
+_END_CAMERAS = ("Cl", "Cr")
+
+_IMAGES_PER_PAIR = 2
+"""Test images of the preset for each test pair with many damages."""
 
 PAPER = {
     "box": {"AP": 71.5, "AP50": 89.9, "AP75": 79.2, "AP_S": 12.5, "AP_M": 50.3, "AP_L": 77.8}
@@ -88,28 +90,28 @@ def near_data(run: Run) -> ContainerDataset:
 
 
 def training_data(run: Run) -> ContainerDataset:
-    """Return pairs with and without damages: of all cameras of the preset, or of damaged ends."""
-    config = Config.preset() if run.full else Config.from_values(MANY_DAMAGES)
+    """Return pairs from all cameras of the preset, or of ends with many damages."""
+    config = Config.from_values({"damage": {"probability": 1.0}} if run.full else MANY_DAMAGES)
     scenes = SceneSettings(_cameras(run), split="train")
     return _data(run, config, run.plan.images, scenes, pairs=True)
 
 
 def test_data(run: Run) -> Kept:
-    """Return the preset's images of test scenes, from the same cameras as the training images."""
+    """Return the preset's images of test scenes, from the cameras of `training_data`."""
     scenes = SceneSettings(_cameras(run), split="test", fixed=True)
     return rendered(_data(run, Config.preset(), run.plan.test_images, scenes), run.cache)
 
 
 def damaged_data(run: Run) -> Kept:
-    """Return pairs of test scenes with many damages, which show what makes a damage visible."""
+    """Return pairs of test scenes with many damages, from the end cameras."""
     config = Config.from_values(MANY_DAMAGES)
-    scenes = SceneSettings(_cameras(run), split="test", fixed=True)
-    count = run.plan.test_images // _DAMAGED_SHARE
+    scenes = SceneSettings(_END_CAMERAS, split="test", fixed=True)
+    count = run.plan.test_images // _IMAGES_PER_PAIR
     return rendered(_data(run, config, count, scenes, pairs=True), run.cache)
 
 
 def _cameras(run: Run) -> tuple[str, ...] | None:
-    return None if run.full else ("Cl", "Cr")
+    return None if run.full else _END_CAMERAS
 
 
 def _data(
@@ -148,7 +150,7 @@ def class_table(boxes: Scores, masks: Scores) -> Table:
 
 
 def tested(model: Detector, pairs: Kept) -> list[Outcome]:
-    """Return labels and detections of the damaged images of pairs."""
+    """Return labels, detections and visible change of the damaged image of each pair."""
     found = []
     for k in range(len(pairs)):
         images, (target, _) = pairs[k]
@@ -188,7 +190,12 @@ def main(argv: Sequence[str] | None = None) -> None:
         class_table(boxes, masks),
         *recall_tables(tested(model, damaged_data(run)), least),
     ]
-    more = {"parameters": parameters(model), "score": least, "last_loss": losses[-1]}
+    more = {
+        "parameters": parameters(model),
+        "score": least,
+        "last_loss": losses[-1],
+        "near_plan": asdict(near.plan),
+    }
     conclude(run, tables, {"box": boxes.summary, "mask": masks.summary, **more})
 
 

@@ -105,7 +105,7 @@ class Generator:
             imported(self.config.postprocess)  # refuses an unusable one at once
         # the cameras of a scene are usually rendered one after the other
         self._sampled: tuple[tuple[Config, int, int], PreparedScene] | None = None
-        self._given: tuple[Scene, PreparedScene] | None = None
+        self._given: tuple[tuple[Scene, PreparedScene], ...] = ()
         markings = self.config.markings
         own = OwnPrints(
             {name: art_of(text) for name, text in markings.own_art.items()},
@@ -353,13 +353,19 @@ class Generator:
         return prepared, check_camera(camera, prepared.scene)
 
     def _prepared(self, scene: Scene) -> PreparedScene:
-        """Return the geometry of a scene; check and prepare it once for all its cameras."""
+        """Return the geometry of a scene; check and prepare it once for all its cameras.
+
+        The last two scenes are kept: damaged and undamaged ones may alternate.
+        """
         sampled, given = self._sampled, self._given  # another thread may replace them
         if sampled is not None and scene is sampled[1].scene:
             return sampled[1]
-        if given is None or scene is not given[0]:
-            self._given = given = scene, PreparedScene(self.checked(scene))
-        return given[1]
+        for known, prepared in given:
+            if scene is known:
+                return prepared
+        prepared = PreparedScene(self.checked(scene))
+        self._given = ((scene, prepared), *given[:1])
+        return prepared
 
 
 def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:

@@ -62,22 +62,19 @@ PropHit first_prop(vec3 ray, float depth) {
     return first;
 }
 
-// Reflectance of a dielectric with a refractive index of 1.5, seen head-on. It doubles that of black
-// parts. The sides of a prop are rough, so they reflect about what shines on them.
-const float PROP_SHEEN = 0.04;
 const float PROP_OFFSET_M = 0.004;
-const float BESIDE_M = 0.8;      // Distance of the ground that stands for all that a face sees.
 
+// Twin of _of_prop() in fastgen/render/scene_bodies.py.
 vec3 prop_color(PropHit hit, vec3 at) {
     vec3 n = hit.normal;
-    vec4 ambient = ground_ambient(at.xy + 0.3 * n.xy);
-    vec3 beside = vec3(fma(vec2(BESIDE_M), n.xy, at.xy), ground_height_m);
-    vec3 lit = ambient.rgb +
-               ground_lights(beside, vec3(0.0, 0.0, 1.0), hidden_by_boxes(beside, BESIDE_M), BESIDE_M);
-    float up = 0.5 + 0.5 * n.z, raised = clamp((at.z - ground_height_m) / 0.4, 0.0, 1.0);
+    vec4 ambient = ground_ambient(fma(vec2(PROP_AMBIENT_BESIDE_M), n.xy, at.xy));
+    vec3 beside = vec3(fma(vec2(PROP_SUNLIT_BESIDE_M), n.xy, at.xy), ground_height_m);
+    float hidden = hidden_by_boxes(beside, PROP_SUNLIT_BESIDE_M);
+    vec3 lit = ambient.rgb + ground_lights(beside, vec3(0.0, 0.0, 1.0), hidden, PROP_SUNLIT_BESIDE_M);
+    float up = 0.5 + 0.5 * n.z, raised = clamp((at.z - ground_height_m) / PROP_OPEN_M, 0.0, 1.0);
     vec3 light = up * ambient.a * diffuse_radiance(n + vec3(0.0, 0.0, 0.5)) +
                  (1.0 - up) * ground_albedo * lit;
-    light *= mix(0.55, 1.0, raised);
+    light *= mix(PROP_LOWEST_SHARE, 1.0, raised);
     vec3 outside = fma(vec3(PROP_OFFSET_M), n, at);
     light += ground_lights(outside, n, hidden_by_boxes(outside, PROP_OFFSET_M), PROP_OFFSET_M);
     return exposure * (body_paint[hit.body].rgb + PROP_SHEEN) * light;

@@ -1,4 +1,4 @@
-"""Recall of damages by shape, size and change against cases made by hand."""
+"""Recall of damages by shape, size and change, against cases made by hand."""
 
 import numpy as np
 import pytest
@@ -45,6 +45,14 @@ def test_slenderness_of_a_tilted_bar_is_its_length_over_its_width():
     assert slenderness(square) == pytest.approx(1)
 
 
+def test_change_hardly_counts_single_pixels():
+    target = labelled((2, square(20, 100)))
+    whole = torch.full((3, SIDE, SIDE), 100, dtype=torch.uint8)
+    noisy = whole.clone()
+    noisy[:, ::2, ::2] = 160
+    assert changes([noisy, whole], target) == pytest.approx([15], abs=2)
+
+
 @pytest.mark.parametrize(("share", "expected"), [(0.05, 0), (0.2, 60), (1.0, 60)])
 def test_change_is_that_of_the_tenth_that_changes_most(share, expected):
     target = labelled((2, square(20, 100)))
@@ -56,17 +64,24 @@ def test_change_is_that_of_the_tenth_that_changes_most(share, expected):
 
 def test_damages_are_counted_by_kind_size_and_change():
     container = (1, np.ones((SIDE, SIDE), np.uint8))
+    bar = np.zeros((SIDE, SIDE), np.uint8)
+    bar[150:160, 5:17] = bar[150, 5:66] = 1
     first = labelled(container, (2, square(5, 10)), (2, square(30, 40)), (5, square(80, 100)))
-    second = labelled(container, (2, square(5, 12)))
+    second = labelled(container, (2, bar))
+    detected = found(first, 0, 1, 3)
+    detected["masks"][2] = False  # the right box with another mask
     tested = [
-        Outcome(first, found(first, 0, 1, 3), np.array([99.0, 5.0, 10.0, 40.0])),
+        Outcome(first, detected, np.array([99.0, 5.0, 10.0, 40.0])),
         Outcome(second, found(second, 0), np.array([99.0, 31.9])),
     ]
     usual, by_size, by_change = recall_tables(tested, 0.5)
     shares = {row[0]: row[1:] for row in usual.rows}
-    assert shares["all damages"] == [4, 50.0, 50.0]
+    assert shares["all damages"] == [4, 50.0, 25.0]
     assert shares["axis"] == [3, pytest.approx(100 / 3), pytest.approx(100 / 3)]
     assert shares["small"] == [2, 50.0, 50.0]
+    assert shares["larger"] == [2, 50.0, 0.0]
+    assert shares["thin"] == shares["small and thin"] == [1, 0.0, 0.0]
+    assert shares["not thin"] == [3, pytest.approx(200 / 3), pytest.approx(100 / 3)]
     assert np.isnan(shares["dented"][1])
     assert by_size.heads == ["damages", "below 16 px", "16 to 32", "32 to 64", "64 px or more"]
     sizes = {row[0]: row[1:] for row in by_size.rows}

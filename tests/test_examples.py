@@ -264,6 +264,7 @@ def test_cached_pairs_stay_together_in_every_batch(tmp_path):
         numbers = [target["image_id"] for target in targets]
         assert len(images) == len(targets)
         assert numbers[::2] == numbers[1::2]
+        assert all(target["labels"].tolist() == [1] for target in targets[1::2])
 
 
 def test_maps_in_bfloat16_are_close_to_those_in_float32(monkeypatch):

@@ -268,7 +268,15 @@ def test_indexing_refuses_positions_that_are_no_whole_numbers(position):
 def test_transforms_that_return_no_pair_are_named():
     items = ItemSettings(transforms=lambda image, target: None)
     data = ContainerDataset("imdg", render=SMALL, items=items)
-    with pytest.raises(ConfigError, match="transforms: gave NoneType; return the pair"):
+    with pytest.raises(ConfigError, match=r"transforms: gave NoneType; return \(image, target\)"):
+        data[0]
+    data.close()
+
+
+def test_transforms_of_pairs_must_return_pairs():
+    items = ItemSettings(pairs=True, transforms=lambda images, targets: (images[0], targets[0]))
+    data = ContainerDataset("damage", render=SMALL, items=items)
+    with pytest.raises(ConfigError, match="transforms: gave Tensor; return two images"):
         data[0]
     data.close()
 

@@ -237,5 +237,6 @@ def test_pairs_stay_together_in_batches_and_transforms():
     stacked, found = next(iter(Loader(data, batch_size=3)))
     data.close()
     assert torch.equal(stacked, torch.stack(images))
+    assert (found[:, 1] > 0).any()
     assert set(found[found[:, 1] > 0, 0].tolist()) <= {0, 2, 4}
     assert set(found[found[:, 1] == 0, 0].tolist()) == {0, 1, 2, 3, 4, 5}

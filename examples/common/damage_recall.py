@@ -1,6 +1,7 @@
-"""Which damages a detector finds: by kind, size, shape and change of the image."""
+"""Recall of damages by kind, shape and size, and by how much they change the image."""
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import cv2
@@ -32,7 +33,7 @@ class Outcome(NamedTuple):
     """Labels of one test image and what the detector finds.
 
     Attributes:
-        target: Labels in the loader's detection form.
+        target: Labels in the loader's detection form, with masks.
         found: Detections.
         change: Change of the image by each labelled object [N], see `changes`.
     """
@@ -45,8 +46,8 @@ class Outcome(NamedTuple):
 def changes(images: Sequence[torch.Tensor], target: Mapping[str, Any]) -> NDArray[np.float64]:
     """Return how much each object changes an image, in 8-bit levels [N].
 
-    A tenth of the object's pixels change by this much or more. The images are blurred with a sigma
-    of 1.2 pixels, which removes most of the noise.
+    A tenth of the object's pixels change by this much or more, in the channel that changes most.
+    The images are blurred with a sigma of 1.2 pixels, which removes most of the noise.
 
     Args:
         images: The image uint8 [3, H, W] with the objects, and its counterpart without them.
@@ -70,71 +71,74 @@ def slenderness(mask: NDArray[np.uint8]) -> float:
     return float(sides.max() / sides.min())
 
 
-def recall_tables(tested: Sequence[Outcome], least: float) -> list[Table]:
-    """Return how many damages are found at an IoU of 0.5: by kind, by shape, size and change.
+def recall_tables(outcomes: Sequence[Outcome], least: float) -> list[Table]:
+    """Return three tables of the damages found at an IoU of 0.5.
+
+    They list shares by kind and shape, and numbers by size and by change of the image.
 
     Args:
-        tested: Labels and detections by image.
+        outcomes: Labels and detections by image.
         least: Smallest score that counts.
     """
-    tally: dict[str, Any] = {}
-    for each in tested:
-        by_box = hits(each.target, each.found, least)
-        by_mask = hits(each.target, each.found, least, masks=True)
-        for name, chosen in _groups_of(each.target).items():
-            counted = np.array([chosen.sum(), by_box[chosen].sum(), by_mask[chosen].sum()])
-            tally[name] = tally.get(name, 0) + counted
+    labels = _joined(outcomes, lambda each: each.target["labels"].numpy())
+    areas = _joined(outcomes, lambda each: each.target["area"].numpy())
+    thin = _joined(outcomes, lambda each: _slender(each.target["masks"].numpy()))
+    change = _joined(outcomes, lambda each: each.change)
+    by_box = _joined(outcomes, lambda each: hits(each.target, each.found, least))
+    by_mask = _joined(outcomes, lambda each: hits(each.target, each.found, least, masks=True))
+    damages, small = labels > 1, areas < SMALL_PX
+    kinds = {"all damages": damages}
+    kinds |= {name: labels == k for k, name in enumerate(SEGMENTATION_CLASSES, start=1) if k > 1}
+    shapes = {"small": small, "larger": ~small, "thin": thin, "not thin": ~thin}
+    shapes["small and thin"] = small & thin
     rows = [
-        [name, int(n), _percent(box, n), _percent(mask, n)]
-        for name, (n, box, mask) in tally.items()
+        [name, int(chosen.sum()), _percent(by_box[chosen]), _percent(by_mask[chosen])]
+        for name, chosen in {**kinds, **{name: damages & s for name, s in shapes.items()}}.items()
     ]
     title = f"Damages found at an IoU of 0.5 and a score of {least:.2f}, %"
-    heads = ["damages", "labels", "by box", "by mask"]
-    return [Table(title, heads, rows), *_visibility_tables(tested, least)]
+    size_title = "Damages found by box, by size (square root of the visible pixels)"
+    return [
+        Table(title, ["damages", "labels", "by box", "by mask"], rows),
+        _numbers(size_title, kinds, by_box, _Groups(np.sqrt(areas), SIZES_PX, "px")),
+        _numbers(
+            "Damages found by box, by change of the image (8-bit levels)",
+            kinds,
+            by_box,
+            _Groups(change, CHANGES, "levels"),
+        ),
+    ]
 
 
-def _visibility_tables(tested: Sequence[Outcome], least: float) -> list[Table]:
-    """Return how many damages of each kind are found by box, by their size and by their change."""
-    labels = np.concatenate([each.target["labels"].numpy() for each in tested])
-    sizes = np.concatenate([np.sqrt(each.target["area"].numpy()) for each in tested])
-    change = np.concatenate([each.change for each in tested])
-    hit = np.concatenate([hits(each.target, each.found, least) for each in tested])
-    tables = []
-    for title, unit, limits, values in (
-        ("size, the square root of its visible pixels", "px", SIZES_PX, sizes),
-        ("change of the image, in 8-bit levels", "levels", CHANGES, change),
-    ):
-        groups = np.digitize(values, limits) - 1
-        heads = [_range(limits, k, unit) for k in range(len(limits))]
-        rows: list[list[object]] = []
-        for number, name in enumerate(("all damages", *SEGMENTATION_CLASSES[1:]), start=1):
-            kind = labels == number if number > 1 else labels > 1
-            chosen = [kind & (groups == k) for k in range(len(limits))]
-            rows.append([name, *(f"{hit[part].sum()} of {part.sum()}" for part in chosen)])
-        tables.append(Table(f"Damages found by {title}", ["damages", *heads], rows))
-    return tables
+class _Groups(NamedTuple):
+    """Groups of values [N] by their lower limits."""
+
+    values: NDArray[np.floating]
+    limits: Sequence[int]
+    unit: str
 
 
-def _groups_of(target: Mapping[str, Any]) -> dict[str, NDArray[np.bool_]]:
-    """Return for each kind of damage which labels of an image belong to it, bool [N] by name."""
-    labels = target["labels"].numpy()
-    damages = labels > 1
-    small = damages & (target["area"].numpy() < SMALL_PX)
-    slender = np.array([slenderness(mask) >= THIN for mask in target["masks"].numpy()], bool)
-    kinds = {name: labels == k for k, name in enumerate(SEGMENTATION_CLASSES, start=1) if k > 1}
-    thin = damages & slender
-    sorts = {"small": small, "larger": damages & ~small, "thin": thin, "not thin": damages & ~thin}
-    return {"all damages": damages, **kinds, **sorts, "small and thin": small & thin}
+def _numbers(
+    title: str, kinds: Mapping[str, NDArray[np.bool_]], hit: NDArray[np.bool_], groups: _Groups
+) -> Table:
+    """Return how many damages of each kind [N] are found in each group."""
+    limits, unit = groups.limits, groups.unit
+    group = np.digitize(groups.values, limits) - 1
+    inner = [f"{low} to {high}" for low, high in itertools.pairwise(limits[1:])]
+    heads = [f"below {limits[1]} {unit}", *inner, f"{limits[-1]} {unit} or more"]
+    rows: list[list[object]] = []
+    for name, kind in kinds.items():
+        chosen = [kind & (group == k) for k in range(len(limits))]
+        rows.append([name, *(f"{hit[part].sum()} of {part.sum()}" for part in chosen)])
+    return Table(title, ["damages", *heads], rows)
 
 
-def _percent(part: int, whole: int) -> float:
-    return 100 * part / whole if whole else float("nan")
+def _joined(outcomes: Sequence[Outcome], of: Callable[[Outcome], NDArray[Any]]) -> NDArray[Any]:
+    return np.concatenate([of(each) for each in outcomes])
 
 
-def _range(limits: Sequence[int], k: int, unit: str) -> str:
-    """Return the name of group k."""
-    if k == 0:
-        return f"below {limits[1]} {unit}"
-    if k == len(limits) - 1:
-        return f"{limits[k]} {unit} or more"
-    return f"{limits[k]} to {limits[k + 1]}"
+def _slender(masks: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    return np.array([slenderness(mask) >= THIN for mask in masks], bool)
+
+
+def _percent(hit: NDArray[np.bool_]) -> float:
+    return 100 * float(hit.mean()) if len(hit) else float("nan")

@@ -28,7 +28,7 @@ class Kept(Dataset[Any]):
     """Items made by `rendered`: an image uint8 [3, H, W] and the dataset's target.
 
     A text item is one crop with a dict of its text and parts. A seal item is one crop with a dict
-    of its label, hasp and image_id. The items of a dataset with pairs are pairs.
+    of its label, hasp and image_id. With `pairs`, an item is two images and two targets.
 
     Attributes:
         collate: Collates items to lists of images and targets.

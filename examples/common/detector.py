@@ -61,7 +61,7 @@ class Detector(Learner):
     def __init__(self, classes: int, width: int = 32, blocks: int = 1, masks: bool = False) -> None:
         super().__init__()
         self.classes, self.masks = classes, masks
-        # with five levels a cell sees 670 pixels: a container may fill the image
+        # down to a stride of 64, where a cell sees 670 pixels: a container may fill the image
         widths = [width, 2 * width, 3 * width, 4 * width, 4 * width]
         self.stem = nn.Sequential(_conv(3, width // 2, 2), _conv(width // 2, width, 2))
         levels, sides = [], [nn.Conv2d(width, width, 1)]
@@ -81,8 +81,8 @@ class Detector(Learner):
     def forward(self, pixels: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Run the network on images float32 [B, 3, H, W] in -1..1.
 
-        Where the processor is fast at bfloat16, all layers but the last ones compute in it. On a
-        CPU with AVX512-BF16, a training step then takes a third of the time.
+        Where the processor is fast at bfloat16, all layers except the output layers compute in
+        it. On a CPU with AVX512-BF16, a training step then takes a third of the time.
 
         Returns:
             Float32 maps at a quarter of the image size: heat logits [B, classes, h, w], logarithms
@@ -142,7 +142,7 @@ class Detector(Learner):
             [N] from 1, and scores float32 [N]. Also masks bool [N, H, W] if the detector has
             masks.
         """
-        maps = [m.float() for m in self(self._pixels(images))]
+        maps = self(self._pixels(images))
         heat = maps[0].sigmoid()
         peaks = heat * (functional.max_pool2d(heat, 3, 1, 1) == heat)
         height, width = heat.shape[2:]

@@ -16,7 +16,7 @@ from fastgen.damages import fields
 from fastgen.decals.artwork import ART_SIZE
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
-from fastgen.light import environment
+from fastgen.light import environment, prop_light
 from fastgen.light.ground_light import LINE_MM
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX
 from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
@@ -201,6 +201,11 @@ def _ground(v: ShaderVariant) -> Defines:
         "GROUND_FADE_START": GROUND_FADE_START,
         "LINE_MM": LINE_MM,
         "MAX_BOXES": MAX_BOXES,
+        "PROP_AMBIENT_BESIDE_M": prop_light.AMBIENT_BESIDE_M,
+        "PROP_SUNLIT_BESIDE_M": prop_light.SUNLIT_BESIDE_M,
+        "PROP_LOWEST_SHARE": prop_light.LOWEST_SHARE,
+        "PROP_OPEN_M": prop_light.OPEN_M,
+        "PROP_SHEEN": prop_light.SHEEN,
         "TILE_PX": TILE_PX,
     }
 

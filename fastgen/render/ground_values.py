@@ -21,10 +21,8 @@ _STAINED = 0.045
 _NO_GAP_M = 1e6
 """Height of a gap below a box for which the grid of light is fine enough."""
 
-_LEAST_GAP_M = 1e-3
-
 _RAIL_INSET_MM = Layout.frame_recess_mm + BESIDE_MM
-"""Distance of the bottom rails from the outer plane of the castings."""
+"""Distance of the bottom rails from the castings' outer plane. Sills are up to 7 mm deeper."""
 
 _CLEARANCE_MM = 1500.0
 """Width of the ground around the scene that no part of the panorama hides."""
@@ -52,10 +50,11 @@ def ground_values(
     for place, body in zip(places, bodies, strict=True):
         rows[0, place] = *body.center_mm * MM, body.rotation[0, 0]
         rows[1, place] = *body.half_mm * MM, body.rotation[1, 0]
-    for place, (member, box) in enumerate(zip(members, bodies, strict=False)):
+    for place, member in enumerate(members):
         rows[2, place, :3] = member.prepared.scene.surface.paint.albedo
-        gap = (box.center_mm[2] - box.half_mm[2] - ground.height_mm) * MM
-        rows[2, place, 3] = max(gap, _LEAST_GAP_M) if gap < LOW_GAP_M else _NO_GAP_M
+        gap = (member.box.center_mm[2] - member.box.half_mm[2] - ground.height_mm) * MM
+        # below other boxes the grid of light is fine enough, see ground_light.LOW_GAP_M
+        rows[2, place, 3] = gap + RING_BOTTOM_MM * MM if gap < LOW_GAP_M else _NO_GAP_M
     for place, prop in enumerate(props, MAX_BOXES):
         rows[2, place] = *prop.albedo, 2.0 if prop.shape == "cylinder" else 0.0
     turned = np.array([body.axes @ toward for body in bodies]).reshape(-1, 3)
@@ -91,9 +90,9 @@ def ground_values(
 
 
 def _within_rails(box: OrientedBox) -> OrientedBox:
-    """Return the part of a container's box within its bottom rails and above their lower edge.
+    """Return the part of a container's box between its bottom rails, from their lower edge upward.
 
-    Only castings are outside. Light reaches the ground between them.
+    Only the castings are below. Light reaches the ground between them.
     """
     raised = np.array([0.0, 0.0, 0.5 * RING_BOTTOM_MM])
     inset = np.array([_RAIL_INSET_MM, _RAIL_INSET_MM, 0.0])

@@ -1,6 +1,7 @@
 """Bodies of a scene that rays can hit: containers, spreader, ground and props, in their light."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.prepared_scene import Member
 from fastgen.geometry.unit_solids import unit_solid
+from fastgen.light import prop_light
 from fastgen.light.environment import Ambient, sky_irradiance, to_map_frame
 from fastgen.light.ground_light import GroundLight, mean_albedo
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
@@ -18,19 +20,7 @@ from fastgen.scene import Ground, Prop, Scene
 from fastgen.scene.boxes import OrientedBox, rotation_of
 from fastgen.scene.limits import MM
 
-_BESIDE_M = 0.3
-"""Distance before the face of a prop at which the ground stands for what is around the face."""
-
-_FOOT_MM = 800.0
-"""The same distance for the sunlight on the ground."""
-
 _FAR_MM = 1e6
-
-_SHEEN = np.float32(0.04)
-"""PROP_SHEEN in shaders/ground_props.glsl."""
-
-_LOWEST, _OPEN_M = 0.55, 0.4
-"""Share of the light around it that a prop gets at the ground, and height of the full share."""
 
 
 class LitMember(NamedTuple):
@@ -81,11 +71,9 @@ def scene_bodies(
         bodies.append(_of_ground(scene.ground, ground))
         yaw_deg = scene.environment.yaw_deg
         boxes = [each.member.box for each in members]
-        for prop in scene.props:
-            place, normals = _surface(prop)
-            sunlight = _on_ground(place + _FOOT_MM * normals, scene.ground, suns, boxes)
-            sky = sky_irradiance(ambient, normals + (0.0, 0.0, 0.5), yaw_deg)
-            bodies.append(_of_prop(prop, scene.ground, ground, sky, sunlight))
+        sunlight = partial(sunlight_on_ground, ground=scene.ground, suns=suns, boxes=boxes)
+        sky = partial(sky_irradiance, ambient, yaw_deg=yaw_deg)
+        bodies += [_of_prop(prop, scene.ground, ground, sky, sunlight) for prop in scene.props]
     return RayBodies(bodies, suns)
 
 
@@ -137,14 +125,7 @@ def _of_ground(ground: Ground, light: GroundLight) -> LitBody:
     )
 
 
-def _surface(prop: Prop) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the vertices [V, 3] of a prop in mm, and their normals [V, 3]."""
-    solid, turn = unit_solid(prop.shape), rotation_of(prop.pose)
-    corners = solid.corners * np.array(prop.size_mm) / 2
-    return corners @ turn.T + np.array(prop.pose.position_mm), solid.normals @ turn.T
-
-
-def _on_ground(
+def sunlight_on_ground(
     place_mm: NDArray[np.float64],
     ground: Ground,
     suns: Iterable[DistantLight],
@@ -166,30 +147,37 @@ def _of_prop(
     prop: Prop,
     ground: Ground,
     light: GroundLight,
-    sky: NDArray[np.floating],
-    sunlight: NDArray[np.float64],
+    sky: Callable[[NDArray[np.float64]], NDArray[np.floating]],
+    sunlight: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> LitBody:
     """Return a prop in the light of the sky and the ground around it.
 
-    The numpy twin of prop_color() in shaders/ground_props.glsl, except that directional lights do
-    not shine on the prop itself.
+    The numpy twin of prop_color() in shaders/ground_props.glsl at the vertices. Directional lights
+    do not shine on the prop itself, and have sharp shadows on the ground beside it.
 
     Args:
         prop: The prop.
         ground: The ground.
         light: Light on the ground.
-        sky: Irradiance / pi [V, 3] of the sky at its vertices.
-        sunlight: Irradiance / pi [V, 3] of the directional lights on the ground before them.
+        sky: Returns irradiance / pi [V, 3] of the sky on surfaces with normals [V, 3].
+        sunlight: Returns irradiance / pi [V, 3] of the directional lights on the ground below
+            places [V, 3].
     """
-    place, normals = _surface(prop)
-    around = light.at(place[:, :2] * MM + _BESIDE_M * normals[:, :2])
+    solid, turn = unit_solid(prop.shape), rotation_of(prop.pose)
+    corners = solid.corners * np.array(prop.size_mm) / 2
+    place = corners @ turn.T + np.array(prop.pose.position_mm)
+    normals = solid.normals @ turn.T
+    around = light.at(place[:, :2] * MM + prop_light.AMBIENT_BESIDE_M * normals[:, :2])
     up = 0.5 + 0.5 * normals[:, 2:]
-    below = np.array(ground.albedo) * (around[:, :3] + sunlight)
-    found = up * around[:, 3:] * sky + (1 - up) * below
-    raised = np.clip((place[:, 2:] - ground.height_mm) * MM / _OPEN_M, 0.0, 1.0)
+    from_ground = around[:, :3] + sunlight(place + prop_light.SUNLIT_BESIDE_M / MM * normals)
+    from_sky = around[:, 3:] * sky(normals + (0.0, 0.0, 0.5))
+    found = up * from_sky + (1 - up) * np.array(ground.albedo) * from_ground
+    raised = np.clip((place[:, 2:] - ground.height_mm) * MM / prop_light.OPEN_M, 0.0, 1.0)
+    lowest = prop_light.LOWEST_SHARE
+    paint = np.array(prop.albedo, np.float32) + np.float32(prop_light.SHEEN)
     return LitBody(
         place.astype(np.float32),
-        unit_solid(prop.shape).triangles.astype(np.uint32),
-        np.broadcast_to(np.array(prop.albedo, np.float32) + _SHEEN, place.shape),
-        (found * (_LOWEST + (1 - _LOWEST) * raised)).astype(np.float32),
+        solid.triangles.astype(np.uint32),
+        np.broadcast_to(paint, place.shape),
+        (found * (lowest + (1 - lowest) * raised)).astype(np.float32),
     )

@@ -4,7 +4,7 @@ A dataset is described by three groups of settings:
 
     RenderSettings  how an image is rendered: size, quality, device
     SceneSettings   which scenes an epoch has, and which cameras see them
-    ItemSettings    what an item holds: form of the target, dtype, transforms
+    ItemSettings    what an item holds: form of the target, dtype, transforms, pairs
 """
 
 try:

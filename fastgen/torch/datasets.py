@@ -52,7 +52,7 @@ class ContainerDataset(Dataset[Item]):
         task: damage, imdg, text, door or seal; `targets.item_of` describes image and target.
         config: Distribution of the scenes; by default that of the preset seafront.
         seed: Whole number of 0 or more.
-        length: Images per epoch, over all ranks.
+        length: Items per epoch, over all ranks. An item is an image, or with `items.pairs` a pair.
         render: How images are rendered: size, quality, backend, device and HDRIs.
         scenes: Which scenes an epoch has, and which cameras see them.
         items: What an item holds.
@@ -89,8 +89,8 @@ class ContainerDataset(Dataset[Item]):
         self.epoch_settings = 0
         self._taken = torch.zeros(2, dtype=torch.int64).share_memory_()  # items, and if it warned
         self._epoch_config = (0, config_of(scenes.curriculum, self.config, 0))
-        # epoch and index of the last scene, the scene, and the same without damages
-        self._scenes: tuple[tuple[int, int], Scene, Scene] | None = None
+        # epoch and index of the last scene, and the scene with and without damages
+        self._scenes: tuple[tuple[int, int], tuple[Scene, Scene]] | None = None
         self._digests: dict[int, str] = {}
         self._environments: dict[str, Any] | None = None
 
@@ -155,7 +155,10 @@ class ContainerDataset(Dataset[Item]):
         return self._plan.locate(self.epoch if epoch is None else epoch, position)
 
     def sample(self, position: int, epoch: int | None = None) -> Sample:
-        """Return the Sample from which the item at a position is made."""
+        """Return the Sample from which the item at a position is made.
+
+        With `items.pairs` it is the one with damages.
+        """
         return self._sample(position, self.epoch if epoch is None else epoch)
 
     def _sample(self, position: int, epoch: int, undamaged: bool = False) -> Sample:
@@ -163,19 +166,17 @@ class ContainerDataset(Dataset[Item]):
         generator = self._generator.get()
         last = self._scenes
         if last is None or last[0] != (epoch, index):  # a scene's cameras mostly follow each other
-            config = self.config_at(epoch)
-            scene = sample_scene(config, self.seed, index, generator.environments)
-            whole = scene.undamaged() if self.items.pairs else scene
-            last = self._scenes = ((epoch, index), scene, whole)
+            scene = sample_scene(self.config_at(epoch), self.seed, index, generator.environments)
+            counterpart = scene.undamaged() if self.items.pairs else scene
+            last = self._scenes = ((epoch, index), (scene, counterpart))
         labels = self.config_at(epoch).labels
-        _, scene, whole = last
-        chosen = whole if undamaged else scene
-        return generator.render(scene=chosen, camera=camera, labels=labels)
+        return generator.render(scene=last[1][undamaged], camera=camera, labels=labels)
 
     def item(self, position: int, epoch: int | None = None) -> Item:
         """Return image and target at a position, 0 or more, after transforms.
 
-        item_of describes both. With `items.pairs` they are pairs.
+        item_of describes both. With `items.pairs` these are a tuple of two images and a tuple of
+        their targets, the one with damages first.
         """
         epoch = self.epoch if epoch is None else epoch
         made = self._made(position, epoch)
@@ -185,10 +186,9 @@ class ContainerDataset(Dataset[Item]):
         if self.items.transforms is None:
             return made
         changed = self.items.transforms(*made)
-        if not isinstance(changed, tuple | list) or len(changed) != 2:
-            what = type(changed).__name__
-            raise ConfigError(f"transforms: gave {what}; return the pair (image, target)")
-        image, target = changed
+        image, target = _two(changed, "(image, target)")
+        if self.items.pairs:
+            image, target = _two(image, "two images"), _two(target, "two targets")
         return image, target
 
     def _made(self, position: int, epoch: int, undamaged: bool = False) -> Item:
@@ -240,6 +240,14 @@ class ContainerDataset(Dataset[Item]):
             raise IndexError(f"position {position} is out of range; there are {self.length}")
         self.count_item()
         return self.item(position % self.length)
+
+
+def _two(changed: Any, wanted: str) -> tuple[Any, Any]:
+    """Return what a transform returned as a tuple of two."""
+    if not isinstance(changed, tuple | list) or len(changed) != 2:
+        raise ConfigError(f"transforms: gave {type(changed).__name__}; return {wanted}")
+    first, second = changed
+    return first, second
 
 
 class ContainerStream(IterableDataset[Item]):

@@ -54,9 +54,9 @@ class ItemSettings:
             class and normalized box.
         as_float: Images are float32 in 0..1 instead of uint8.
         transforms: Called with image and target as `item_of` makes them. Returns both, changed.
-            With `pairs` it is called with two images and two targets.
+            With `pairs` it gets a tuple of two images and a tuple of their targets.
         pairs: For the damage task: an item is an image and its counterpart without damages, from
-            the same camera in the same light. Its target is the pair of their targets.
+            the same camera in the same light. A scene without damages gives two equal images.
 
     Raises:
         ConfigError: A value is not valid.
@@ -99,7 +99,7 @@ def class_names(task: str, config: Config | None = None) -> tuple[str, ...]:
 
 
 def check_items(task: str, items: ItemSettings) -> None:
-    """Raise ConfigError if a task has no targets of this form, or no pairs."""
+    """Raise ConfigError if a task does not support the form or pairs."""
     if items.form == "yolo" and task not in ("damage", "imdg"):
         raise ConfigError(f"form: 'yolo' is for boxes, and the {task} task has none; leave it out")
     if items.pairs and task != "damage":
