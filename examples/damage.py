@@ -16,7 +16,7 @@ from typing import Any
 from common import charts, drawing
 from common.damage_recall import Outcome, changes, recall_tables
 from common.data import Kept, in_order, rendered
-from common.detection_metrics import Scores, operating_point, score
+from common.detection_metrics import Scores, compressed, operating_point, score
 from common.detector import Detector
 from common.run import Plan, Run, Table, conclude, feed_of, parameters, start, train
 
@@ -34,7 +34,7 @@ PLANS = {
 """Sizes of runs, for whole images. `images` and `batch` count pairs in training."""
 
 NEAR_PLANS = {
-    "cpu": Plan(images=6000, test_images=0, size=(256, 256), batch=16, passes=6, rate=2e-3),
+    "cpu": Plan(images=6000, test_images=0, size=(256, 256), batch=16, passes=3, rate=2e-3),
     "full": Plan(
         images=20_000, test_images=0, size=(256, 256), batch=32, passes=20, rate=2e-3, workers=12
     ),
@@ -154,7 +154,8 @@ def tested(model: Detector, pairs: Kept) -> list[Outcome]:
     found = []
     for k in range(len(pairs)):
         images, (target, _) = pairs[k]
-        found.append(Outcome(target, model.predict([images[0]])[0], changes(images, target)))
+        one = compressed(model.predict([images[0]])[0])
+        found.append(Outcome(target, one, changes(images, target)))
     return found
 
 
@@ -170,14 +171,16 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     test = test_data(run)
     targets = [test[i][1] for i in range(len(test))]
-    found = [one for images, _ in in_order(test, plan.batch) for one in model.predict(images)]
+    batches = in_order(test, plan.batch)
+    found = [compressed(one) for images, _ in batches for one in model.predict(images)]
     names = list(SEGMENTATION_CLASSES)
     boxes = score(targets, found, names, plan.size)
     masks = score(targets, found, names, plan.size, masks=True)
     least = operating_point(boxes).score
 
     damaged = [i for i in range(len(test)) if len(targets[i]["labels"]) > 1][:8]
-    pictures = [drawing.drawn(test[i][0], found[i], names, least) for i in damaged]
+    shown = [(test[i][0], model.predict([test[i][0]])[0]) for i in damaged]
+    pictures = [drawing.drawn(image, one, names, least) for image, one in shown]
     bars = {"box AP50": boxes.class_ap50, "mask AP50": masks.class_ap50}
     charts.loss_curve(losses, run.folder / "damage_loss.png")
     charts.bars(names, bars, run.folder / "damage_classes.png")

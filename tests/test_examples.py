@@ -15,7 +15,7 @@ import torch
 from common import detector
 from common.boxes import generalized_iou, iou
 from common.data import Feed, Kept, rendered
-from common.detection_metrics import confusion, hits, operating_point, score
+from common.detection_metrics import compressed, confusion, hits, operating_point, score
 from common.detector import STRIDE, Detector, distinct, gaussians
 from common.run import Table
 from pycocotools import mask as coco_mask
@@ -265,6 +265,23 @@ def test_cached_pairs_stay_together_in_every_batch(tmp_path):
         assert len(images) == len(targets)
         assert numbers[::2] == numbers[1::2]
         assert all(target["labels"].tolist() == [1] for target in targets[1::2])
+
+
+def test_compressed_masks_give_the_same_scores():
+    y, x = np.mgrid[:100, :200]
+    one, other = ((y < 40) & (x > 50), (y > 20) & (x < 160))
+    masks = [torch.from_numpy(mask) for mask in (one, other)]
+    target = labels((1, 51, 0, 200, 40), (2, 0, 21, 160, 100), masks=masks)
+    found = {
+        **labels((1, 51, 0, 200, 40), (2, 0, 21, 150, 100)),
+        "masks": torch.stack([masks[0], masks[1] & (torch.from_numpy(x) < 150)]),
+        "scores": torch.tensor([0.9, 0.8]),
+    }
+    small = compressed(found)
+    plain, same = (score([target], [each], NAMES, SIZE, masks=True) for each in (found, small))
+    assert plain.summary == pytest.approx(same.summary, nan_ok=True)
+    assert 0 < plain.summary["AP"] < 100
+    assert (hits(target, small, 0.5, masks=True) == hits(target, found, 0.5, masks=True)).all()
 
 
 def test_maps_in_bfloat16_are_close_to_those_in_float32(monkeypatch):

@@ -21,7 +21,8 @@ from pycocotools.cocoeval import COCOeval
 
 from common.boxes import iou
 
-Found = Mapping[str, torch.Tensor]
+Found = Mapping[str, Any]
+"""Detections of an image, as `Detector.predict` or `compressed` returns them."""
 
 _SUMMARY = {
     "AP": 0,
@@ -248,7 +249,15 @@ def _mask_iou(a: torch.Tensor, b: torch.Tensor) -> NDArray[np.float64]:
     return np.asarray(coco_mask.iou(_rle(a), _rle(b), [0] * len(b))).reshape(shape)
 
 
-def _rle(masks: torch.Tensor) -> list[dict[str, Any]]:
+def compressed(found: Found) -> Found:
+    """Return detections with masks as COCO's run lengths, of which all images fit into memory."""
+    return {**found, "masks": _rle(found["masks"])}
+
+
+def _rle(masks: torch.Tensor | list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return COCO's run lengths of masks bool [N, H, W]; those of `compressed` stay as they are."""
+    if isinstance(masks, list):
+        return masks
     return [coco_mask.encode(np.asfortranarray(m.numpy().astype(np.uint8))) for m in masks]
 
 
