@@ -1,6 +1,7 @@
 """What rays of the quality `high` hit, against what is drawn."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, load_environment
 from fastgen.light.ground_light import ground_light
 from fastgen.light.hdri import bundled_hdris
-from fastgen.light.ray_bodies import DistantLight
-from fastgen.render.scene_bodies import scene_bodies, sunlight_on_ground
+from fastgen.light.surrounding_light import directional_light
+from fastgen.render.scene_bodies import scene_bodies
 from fastgen.scene import Camera, EnvironmentView, Ground, Pose, Prop, Spreader
 from fastgen.scene.boxes import OrientedBox
 from fastgen.scene.optics import Weather
@@ -74,13 +75,17 @@ def test_rays_see_props_in_the_light_in_which_they_are_drawn(name):
 
 def test_a_box_hides_the_sun_from_the_ground_behind_it():
     box = OrientedBox(np.array([0.0, 0.0, 0.0]), np.array([1000.0, 3000.0, 1000.0]), np.eye(3))
-    ground = Ground("asphalt", -1000.0)
     toward, light = np.array([3.0, 0.0, 4.0]) / 5, np.array([2.0, 1.0, 0.5])
     # the shadow is 1.5 m long on the side away from the sun
     x = np.array([-4000.0, -2600.0, -2400.0, -1100.0, 1100.0, 4000.0])
-    places = np.column_stack([x, np.zeros(6), np.full(6, 700.0)])
-    found = sunlight_on_ground(places, ground, [DistantLight(toward, light)], [box])
+    places = np.column_stack([x, np.zeros(6), np.full(6, -1000.0)])
+    level = np.broadcast_to((0.0, 0.0, 1.0), places.shape)
+
+    def found_from(direction):
+        sun = SimpleNamespace(direction=direction, light=light)
+        return directional_light(places, level, [box], SimpleNamespace(lights=[sun]), 0.0)
+
+    found = found_from(toward)
     shown = np.array([True, True, False, False, True, True])
     np.testing.assert_allclose(found, shown[:, None] * 0.8 * light, atol=1e-9)
-    below = [DistantLight(-toward, light)]
-    assert not sunlight_on_ground(places, ground, below, []).any()
+    assert not found_from(-toward).any()

@@ -1,4 +1,4 @@
-"""Recall of damages by kind, shape and size, and by how much they change the image."""
+"""Recall of damages by kind, shape, size and change of the image."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence

@@ -28,29 +28,31 @@ class Kept(Dataset[Any]):
     """Items made by `rendered`: an image uint8 [3, H, W] and the dataset's target.
 
     A text item is one crop with a dict of its text and parts. A seal item is one crop with a dict
-    of its label, hasp and image_id. With `pairs`, an item is two images and two targets.
-
-    Attributes:
-        collate: Collates items to lists of images and targets.
+    of its label, hasp and image_id. A pair is two images and two targets.
     """
 
-    def __init__(self, items: list[Any], pairs: bool = False) -> None:
-        self._items, self._pairs = items, pairs
-        self.collate: Any = partial(collate_pairs, collate_lists) if pairs else collate_lists
+    def __init__(self, items: list[Any]) -> None:
+        self._items = items
 
     def __len__(self) -> int:
         return len(self._items)
 
     def __getitem__(self, position: int) -> tuple[Any, Any]:
         item = self._items[position]
-        if not self._pairs:
+        if isinstance(item, dict):
             return _unpacked(item)
         images, targets = zip(*map(_unpacked, item), strict=True)
         return images, targets
 
+    @property
+    def collate(self) -> Any:
+        """Function that collates items to lists of images and targets."""
+        paired = bool(self._items) and isinstance(self._items[0], list)
+        return partial(collate_pairs, collate_lists) if paired else collate_lists
+
     def with_more(self, other: "Kept") -> "Kept":
         """Return these items followed by those of another."""
-        return Kept(self._items + other._items, self._pairs)
+        return Kept(self._items + other._items)
 
 
 def rendered(data: ContainerDataset, folder: Path) -> Kept:
@@ -63,7 +65,7 @@ def rendered(data: ContainerDataset, folder: Path) -> Kept:
     told = json.dumps([fastgen.__version__, data.epoch, data.description, paired], sort_keys=True)
     path = folder / f"{data.task}_{hashlib.sha256(told.encode()).hexdigest()[:12]}.pt"
     if path.exists():
-        return Kept(torch.load(path, weights_only=True), paired)
+        return Kept(torch.load(path, weights_only=True))
     folder.mkdir(parents=True, exist_ok=True)
     items: list[Any] = []
     start = reported = time.perf_counter()
@@ -89,7 +91,7 @@ def rendered(data: ContainerDataset, folder: Path) -> Kept:
     aside = path.with_suffix(".part")
     torch.save(items, aside)
     aside.rename(path)
-    return Kept(items, paired)
+    return Kept(items)
 
 
 class Feed:
@@ -166,7 +168,7 @@ def _packed(image: torch.Tensor, target: Any) -> dict[str, Any]:
 
 
 def _unpacked(item: dict[str, Any]) -> tuple[torch.Tensor, Any]:
-    """Return image and target of what `_packed` made."""
+    """Return the image and the target that `_packed` stored."""
     pixels = simplejpeg.decode_jpeg(item["jpeg"].numpy().tobytes())
     target = item["target"]
     if isinstance(target, dict) and "masks" in target:

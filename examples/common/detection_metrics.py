@@ -250,7 +250,7 @@ def _mask_iou(a: torch.Tensor, b: torch.Tensor) -> NDArray[np.float64]:
 
 
 def compressed(found: Found) -> Found:
-    """Return detections with masks as COCO's run lengths, of which all images fit into memory."""
+    """Return detections whose masks are COCO's run lengths, which take far less memory."""
     return {**found, "masks": _rle(found["masks"])}
 
 

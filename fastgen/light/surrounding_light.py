@@ -170,17 +170,25 @@ def _face_radiance(
         between[number][:, others] = covered.transpose(2, 0, 1)
         left = 1 - covered.sum(axis=(0, 1))[:, None]
         received[number] = sky_irradiance(light, own.normals, yaw_deg) * left
-        received[number] += _from_lights(start, own.normals, boxes, light, yaw_deg)
+        received[number] += directional_light(start, own.normals, boxes, light, yaw_deg)
     paint = albedos[:, None]
     bounced = np.tensordot(between, received * paint, axes=2)
     found: Array = (received + bounced) * paint
     return found
 
 
-def _from_lights(
+def directional_light(
     points: Array, normals: Array, boxes: Sequence[OrientedBox], light: Ambient, yaw_deg: float
 ) -> Array:
-    """Return irradiance / pi [P, 3] from directional lights that no box hides."""
+    """Return irradiance / pi [P, 3] from the directional lights that no box hides.
+
+    Args:
+        points: World positions [P, 3] in mm.
+        normals: Unit normals [P, 3] of the surfaces there.
+        boxes: Boxes that may hide the lights.
+        light: The environment.
+        yaw_deg: Its rotation.
+    """
     if not light.lights:
         return np.zeros((len(points), 3))
     toward = np.array([to_map_frame(each.direction, -yaw_deg) for each in light.lights])
@@ -237,7 +245,9 @@ def _from_ground(
     hidden = covered.sum(axis=(0, 1))[:, None]
     whole = sky_irradiance(light, up[None], yaw_deg)
     left = whole - hidden * _sky_behind(at, covered, faces, sky)
-    lit = left_of_sky(whole, left, 1 - hidden) + _from_lights(at, normals, boxes, light, yaw_deg)
+    lit = left_of_sky(whole, left, 1 - hidden) + directional_light(
+        at, normals, boxes, light, yaw_deg
+    )
     weight = parts[group, some] * lower[some] / _GROUND_POINTS
     share = _sums(weight[:, None], some, len(points))[:, 0]
     found = _sums(weight[:, None] * lit, some, len(points))

@@ -1,7 +1,6 @@
 """Bodies of a scene that rays can hit: containers, spreader, ground and props, in their light."""
 
-from collections.abc import Callable, Iterable
-from functools import partial
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,12 +14,11 @@ from fastgen.light.environment import Ambient, sky_irradiance, to_map_frame
 from fastgen.light.ground_light import GroundLight, mean_albedo
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
 from fastgen.light.surrounding_change import SurroundingLight
+from fastgen.light.surrounding_light import directional_light
 from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.scene import Ground, Prop, Scene
 from fastgen.scene.boxes import OrientedBox, rotation_of
 from fastgen.scene.limits import MM
-
-_FAR_MM = 1e6
 
 
 class LitMember(NamedTuple):
@@ -71,9 +69,9 @@ def scene_bodies(
         bodies.append(_of_ground(scene.ground, ground))
         yaw_deg = scene.environment.yaw_deg
         boxes = [each.member.box for each in members]
-        sunlight = partial(sunlight_on_ground, ground=scene.ground, suns=suns, boxes=boxes)
-        sky = partial(sky_irradiance, ambient, yaw_deg=yaw_deg)
-        bodies += [_of_prop(prop, scene.ground, ground, sky, sunlight) for prop in scene.props]
+        bodies += [
+            _of_prop(prop, scene.ground, ground, ambient, yaw_deg, boxes) for prop in scene.props
+        ]
     return RayBodies(bodies, suns)
 
 
@@ -125,30 +123,13 @@ def _of_ground(ground: Ground, light: GroundLight) -> LitBody:
     )
 
 
-def sunlight_on_ground(
-    place_mm: NDArray[np.float64],
-    ground: Ground,
-    suns: Iterable[DistantLight],
-    boxes: Iterable[OrientedBox],
-) -> NDArray[np.float64]:
-    """Return irradiance / pi [V, 3] of the directional lights on the ground below places [V, 3]."""
-    start = place_mm.copy()
-    start[:, 2] = ground.height_mm
-    found = np.zeros_like(start)
-    for sun in suns:
-        end = start + _FAR_MM * sun.toward
-        hidden = [box.between(start, end) for box in boxes]
-        lit = ~np.any(hidden, axis=0) if hidden else np.ones(len(start), bool)
-        found += lit[:, None] * sun.light * max(float(sun.toward[2]), 0.0)
-    return found
-
-
 def _of_prop(
     prop: Prop,
     ground: Ground,
     light: GroundLight,
-    sky: Callable[[NDArray[np.float64]], NDArray[np.floating]],
-    sunlight: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    ambient: Ambient,
+    yaw_deg: float,
+    boxes: Sequence[OrientedBox],
 ) -> LitBody:
     """Return a prop in the light of the sky and the ground around it.
 
@@ -158,10 +139,10 @@ def _of_prop(
     Args:
         prop: The prop.
         ground: The ground.
-        light: Light on the ground.
-        sky: Returns irradiance / pi [V, 3] of the sky on surfaces with normals [V, 3].
-        sunlight: Returns irradiance / pi [V, 3] of the directional lights on the ground below
-            places [V, 3].
+        light: Light on the ground without directional lights.
+        ambient: The environment.
+        yaw_deg: Its rotation.
+        boxes: Containers that cast shadows on the ground.
     """
     solid, turn = unit_solid(prop.shape), rotation_of(prop.pose)
     corners = solid.corners * np.array(prop.size_mm) / 2
@@ -169,8 +150,11 @@ def _of_prop(
     normals = solid.normals @ turn.T
     around = light.at(place[:, :2] * MM + prop_light.AMBIENT_BESIDE_M * normals[:, :2])
     up = 0.5 + 0.5 * normals[:, 2:]
-    from_ground = around[:, :3] + sunlight(place + prop_light.SUNLIT_BESIDE_M / MM * normals)
-    from_sky = around[:, 3:] * sky(normals + (0.0, 0.0, 0.5))
+    beside = place + prop_light.SUNLIT_BESIDE_M / MM * normals
+    beside[:, 2] = ground.height_mm
+    level = np.broadcast_to((0.0, 0.0, 1.0), beside.shape)
+    from_ground = around[:, :3] + directional_light(beside, level, boxes, ambient, yaw_deg)
+    from_sky = around[:, 3:] * sky_irradiance(ambient, normals + (0.0, 0.0, 0.5), yaw_deg)
     found = up * from_sky + (1 - up) * np.array(ground.albedo) * from_ground
     raised = np.clip((place[:, 2:] - ground.height_mm) * MM / prop_light.OPEN_M, 0.0, 1.0)
     lowest = prop_light.LOWEST_SHARE
