@@ -12,24 +12,33 @@ bool scraped(int i, vec3 q) {
     return outside < 0.0 && in_contact(q.z, a.z);
 }
 
-// Two layers of scratches. Each cell of height `pitch` across has one, of its own length and depth.
+// Four random numbers in 0..1 of a cell.
+vec4 scrape_random(float cell) {
+    return fract(sin(vec4(12.9898, 78.233, 37.719, 93.989) * cell) * 4375.8547);
+}
+
+// Two layers of scratches that spread like a fan. Each cell of height `pitch` across has one, of its
+// own length and depth. Few are deep, and neighbours resemble each other: what scraped had few
+// points. Scratches end within the scrape.
 float scrape_wear(int i, vec3 q) {
     vec4 a = damage_shape[3 * i];
     vec4 b = damage_shape[3 * i + 1];
     float half_length = damage_along[i].w;
     float wave = b.y * sin(q.x / 170.0 + b.x);
+    float fan = 1.0 + 0.3 * sin(7.0 * b.x) * q.x / half_length;
     float wear = 0.0;
     for (int layer = 0; layer < 2; ++layer) {
-        float across = (q.y + wave * float(1 - layer)) / a.x * (layer == 0 ? 1.0 : 0.37);
+        float across = (q.y + wave * float(1 - layer)) * fan / a.x * (layer == 0 ? 1.0 : 0.37);
         float cell = floor(across);
         // A phase of its own turns each scratch's number into other random numbers.
-        vec4 draw = fract(sin(vec4(12.9898, 78.233, 37.719, 93.989) * (cell + 0.7 * b.x + float(layer))) *
-                          4375.8547);
-        float middle = half_length * (1.6 * draw.y - 0.8);
-        float reach = half_length * mix(0.25, 1.1, draw.z);
-        float along = clamp(4.0 - 4.0 * abs(q.x - middle) / reach, 0.0, 1.0);
-        float profile = clamp(2.0 - 4.0 * abs(across - cell - 0.5), 0.0, 1.0);
-        float depth = draw.x < a.y ? mix(0.4, 1.0, draw.w) : 0.0;
+        vec4 draw = scrape_random(cell + 0.7 * b.x + float(layer));
+        vec4 group = scrape_random(floor(cell / 5.0) + 0.3 * b.x - float(layer));
+        float reach = half_length * mix(0.2, 1.0, sqrt(group.x) * mix(0.4, 1.0, draw.z));
+        float middle = (half_length - reach) * clamp(2.0 * group.y - 1.0 + 0.6 * (draw.y - 0.5), -1.0, 1.0);
+        float along = clamp(3.0 - 3.0 * abs(q.x - middle) / reach, 0.0, 1.0);
+        float thickness = mix(0.15, 0.5, draw.w * along);
+        float profile = clamp(2.0 - 2.0 * abs(across - cell - 0.5) / thickness, 0.0, 1.0);
+        float depth = draw.x < a.y * mix(0.6, 1.4, group.z) ? mix(0.5, 1.0, draw.w) : 0.0;
         wear = max(wear, along * profile * depth);
     }
     return wear;
