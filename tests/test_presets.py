@@ -107,7 +107,7 @@ def test_own_colors_replace_those_of_a_preset_alone():
 @pytest.mark.parametrize("preset", PORTS)
 def test_the_file_of_a_port_has_the_values_of_its_preset(preset):
     path = Path("examples/ports") / f"{preset}.yaml"
-    assert Config.load(path, Config.preset("crane")) == Config.preset(preset)
+    assert Config.load(path) == Config.preset(preset)
 
 
 @pytest.mark.parametrize("preset", PORTS)

@@ -30,7 +30,7 @@ def add_fit(commands: Any) -> None:
         "-o",
         dest="file",
         type=output_file,
-        default=Path("port.yaml"),
+        default=Path("fitted.yaml"),
         metavar="FILE.yaml",
         help="file to write, for --config with the same --preset; default: %(default)s",
     )
