@@ -2,6 +2,7 @@
 // Twin of fastgen/damages/scrape.py.
 
 #include "damage.block"
+#include "cell_noise.glsl"
 #include "damage_field.glsl"
 
 bool scraped(int i, vec3 q) {
@@ -10,11 +11,6 @@ bool scraped(int i, vec3 q) {
     float ragged = 0.5 + 0.3 * sin(q.y / (3.1 * a.x) + b.x) + 0.2 * sin(q.y / a.x - b.x);
     float outside = max(abs(q.y) - damage_across[i].w, abs(q.x) - damage_along[i].w + a.w * ragged);
     return outside < 0.0 && in_contact(q.z, a.z);
-}
-
-// Four random numbers in 0..1 of a cell.
-vec4 scrape_random(float cell) {
-    return fract(sin(vec4(12.9898, 78.233, 37.719, 93.989) * cell) * 4375.8547);
 }
 
 // Two layers of scratches that spread like a fan. Each cell of height `pitch` across has one, of its
@@ -30,9 +26,9 @@ float scrape_wear(int i, vec3 q) {
     for (int layer = 0; layer < 2; ++layer) {
         float across = (q.y + wave * float(1 - layer)) * fan / a.x * (layer == 0 ? 1.0 : 0.37);
         float cell = floor(across);
-        // A phase of its own turns each scratch's number into other random numbers.
-        vec4 draw = scrape_random(cell + 0.7 * b.x + float(layer));
-        vec4 group = scrape_random(floor(cell / 5.0) + 0.3 * b.x - float(layer));
+        // Each scrape and layer has random numbers of its own, from a whole number.
+        float own = 4.0 * floor(1000.0 * b.x) + 2.0 * float(layer);
+        vec4 draw = cell_noise(vec2(cell, own)), group = cell_noise(vec2(floor(cell / 5.0), own + 1.0));
         float reach = half_length * mix(0.2, 1.0, sqrt(group.x) * mix(0.4, 1.0, draw.z));
         float middle = (half_length - reach) * clamp(2.0 * group.y - 1.0 + 0.6 * (draw.y - 0.5), -1.0, 1.0);
         float along = clamp(3.0 - 3.0 * abs(q.x - middle) / reach, 0.0, 1.0);

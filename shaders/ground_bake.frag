@@ -12,7 +12,7 @@ layout(location = 1) out vec4 out_surface;   // Unused, roughness, metallic: glT
 
 void main() {
     vec2 at_mm = fma(gl_FragCoord.xy, vec2(texel_mm), low_mm);
-    GroundMaterial m = ground_material(at_mm, Footprint(vec2(1.0, 0.0), texel_mm, 0.0, texel_mm));
+    GroundMaterial m = ground_material(at_mm, GroundFootprint(vec2(1.0, 0.0), texel_mm, 0.0, texel_mm));
     out_albedo = vec4(srgb_encode(m.albedo), 1.0);
     out_surface = vec4(1.0, m.roughness, 0.0, 1.0);
 }

@@ -1,8 +1,9 @@
-// GroundMaterial ground_material(vec2 at_mm, Footprint f): the ground at a world position.
+// GroundMaterial ground_material(vec2 at_mm, GroundFootprint f): the ground at a world position.
 // The kind of ground is a constant of the program. All patterns are filtered over the footprint.
 
 #include "ground.constants"
 #include "ground.block"
+#include "cell_noise.glsl"
 #include "ground_pattern.glsl"
 #include "noise.glsl"
 #include "wetness.glsl"
@@ -10,7 +11,6 @@
 struct GroundMaterial {
     vec3 albedo;
     float roughness;
-    float puddle;    // Share under standing water.
 };
 
 // Cracks follow level lines of noise, whose share of the area does not depend on the footprint.
@@ -22,20 +22,20 @@ float cracks(float value, float lost) {
 float patch_tone(vec2 at, vec2 filter_width) {
     const vec2 cell_mm = vec2(5200.0, 7300.0);
     vec2 cell = floor(at / cell_mm);
-    vec4 random = cell_noise(cell);
-    vec2 half_size = mix(vec2(300.0, 400.0), vec2(1400.0, 2600.0), random.xy * random.yx);
+    vec4 random = cell_noise(cell), other = cell_noise(cell + 101.0);
+    vec2 half_size = mix(vec2(300.0, 400.0), vec2(1400.0, 2600.0), random.xy * random.xy);
     vec2 from_center = at - (cell + 0.5) * cell_mm - (random.zw - 0.5) * (cell_mm - 2.0 * half_size);
     float patched = band_cover(from_center.x, half_size.x, filter_width.x) *
                     band_cover(from_center.y, half_size.y, filter_width.y);
     float filled = band_cover(from_center.x, half_size.x - 25.0, filter_width.x) *
                    band_cover(from_center.y, half_size.y - 25.0, filter_width.y);
     // A seam of bitumen around it.
-    float exists = step(random.z, 0.55 * ground_wear);
-    return 1.0 + exists * (filled * (random.w > 0.35 ? -0.28 : 0.22) - 0.45 * (patched - filled));
+    float exists = step(other.x, 0.55 * ground_wear);
+    return 1.0 + exists * (filled * (other.y > 0.35 ? -0.28 : 0.22) - 0.45 * (patched - filled));
 }
 
 // Blocks of 200 x 100 mm in herringbone bond: their color, and sand in the joints.
-vec3 paving(vec2 at, Footprint f, vec2 filter_width) {
+vec3 paving(vec2 at, GroundFootprint f, vec2 filter_width) {
     vec2 cell = floor(at * 0.01);
     int kind = int(cell.x - cell.y) & 3;   // 0 and 1: along x; 3 and 2: along y.
     bool across = kind < 2;
@@ -50,7 +50,7 @@ vec3 paving(vec2 at, Footprint f, vec2 filter_width) {
     return mix(vec3(0.96, 0.955, 0.95), tone, near);   // The mean of blocks and joints.
 }
 
-GroundMaterial ground_material(vec2 at_mm, Footprint f) {
+GroundMaterial ground_material(vec2 at_mm, GroundFootprint f) {
     vec2 along = line_direction, side = vec2(along.y, -along.x);
     vec2 on_lines = vec2(dot(at_mm, side), dot(at_mm, along));
     vec2 filter_width = vec2(width_along(f, side), width_along(f, along));
@@ -99,12 +99,12 @@ GroundMaterial ground_material(vec2 at_mm, Footprint f) {
                      fma(0.25, grain, 1.0);
     albedo = mix(albedo, line_tone, line * paint * fma(0.3, grain, 0.85));
 
-    float roughness = 0.9, puddle = 0.0;
+    float roughness = 0.9;
 #if GROUND_WET
-    puddle = covered(broad.value.x, puddle_threshold, broad.lost.x, 0.05);
+    float puddle = covered(broad.value.x, puddle_threshold, broad.lost.x, 0.05);
     float damp = max(covered(broad.value.x, damp_threshold, broad.lost.x, 0.3), puddle);
     apply_wetness(albedo, roughness, 0.0, 0.65 * damp);
     roughness = mix(roughness, 0.06, puddle);
 #endif
-    return GroundMaterial(albedo, roughness, puddle);
+    return GroundMaterial(albedo, roughness);
 }

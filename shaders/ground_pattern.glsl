@@ -1,19 +1,18 @@
 // Filtered patterns of the ground in the plane; all lengths in mm.
-// struct Footprint: the ellipse on the ground that a pixel sees.
-// float width_along(Footprint f, vec2 axis): its width along a unit vector.
+// struct GroundFootprint: the ellipse on the ground that a pixel sees.
+// float width_along(GroundFootprint f, vec2 axis): its width along a unit vector.
 // float band_cover(float x, float half_width, float filter_width): share of a filter on a band about 0.
 // float bands_cover(float x, float spacing, float width, float filter_width): the same for bands about
 // all multiples of `spacing`.
-// vec4 cell_noise(vec2 cell): four independent numbers in 0..1 for a cell with whole coordinates.
 
-struct Footprint {
+struct GroundFootprint {
     vec2 along;      // Unit vector along its longer axis.
     float least;     // Its width.
     float stretch;   // Its length over its width, squared, less 1.
     float noise;     // Width for lookups of noise.
 };
 
-float width_along(Footprint f, vec2 axis) {
+float width_along(GroundFootprint f, vec2 axis) {
     float aligned = dot(axis, f.along);
     return f.least * sqrt(fma(aligned * aligned, f.stretch, 1.0));
 }
@@ -34,11 +33,4 @@ float bands_cover(float x, float spacing, float width, float filter_width) {
     x += 0.5 * width;
     float high = bands_integral(x + 0.5 * filter_width, spacing, width);
     return (high - bands_integral(x - 0.5 * filter_width, spacing, width)) / filter_width;
-}
-
-// Hoskins 2014, Hash without Sine (MIT licence): hash42.
-vec4 cell_noise(vec2 cell) {
-    vec4 p = fract(cell.xyxy * vec4(0.1031, 0.1030, 0.0973, 0.1099));
-    p += dot(p, p.wzxy + 33.33);
-    return fract((p.xxyz + p.yzzw) * p.zywx);
 }
