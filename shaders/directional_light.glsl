@@ -4,6 +4,7 @@
 #include "reflectance.constants"
 #include "view.block"
 #include "brdf.glsl"
+#include "ggx.glsl"
 #include "reflectance.glsl"
 
 vec3 light_reflection(BrdfTerms r, int i) {
@@ -15,16 +16,9 @@ vec3 light_reflection(BrdfTerms r, int i) {
     float n_dot_h = max(dot(r.normal, half_way), 0.0);
     // The light's disc spreads half vectors by half its radius (after Karis 2013, area lights).
     float alpha = m.roughness * m.roughness + 0.5 * light_direction[i].w;
-    float a2 = alpha * alpha;
-    // GGX distribution: Walter et al. 2007, Microfacet Models for Refraction through Rough Surfaces,
-    // eq. 33. Masking and shadowing: Heitz 2014, Understanding the Masking-Shadowing Function, eq. 99.
-    float d = fma(n_dot_h * n_dot_h, a2 - 1.0, 1.0);
-    float distribution = a2 / (d * d);   // Times pi, because light_irradiance is irradiance / pi.
-    float masking = 0.5 / (n_dot_l * sqrt(fma(n_dot_v * n_dot_v, 1.0 - a2, a2)) +
-                           n_dot_v * sqrt(fma(n_dot_l * n_dot_l, 1.0 - a2, a2)) + 1e-5);
     float grazing = fresnel_climb(clamp(dot(r.view, half_way), 0.0, 1.0));
     vec3 metal = mix(m.albedo, vec3(1.0), grazing) * (1.0 + m.albedo * r.gain);
     float dielectric = mix(DIELECTRIC_F0, 1.0, grazing) * (1.0 + DIELECTRIC_F0 * r.gain);
-    vec3 specular = mix(vec3(dielectric), metal, m.metallic) * (distribution * masking);
+    vec3 specular = mix(vec3(dielectric), metal, m.metallic) * ggx(alpha, n_dot_h, n_dot_l, n_dot_v);
     return (r.diffuse + specular) * light_irradiance[i].rgb * n_dot_l;
 }

@@ -33,7 +33,7 @@ vec3 ground_color(vec3 at, vec3 ray, float depth) {
     float longest = 1e3 * least * sqrt(stretch);
     // Sharper than the longer axis; the shorter one alone would flicker.
     float noise = max(1e3 * least * sqrt(sqrt(stretch)), 0.4 * longest);
-    Footprint f = Footprint(along, 1e3 * least, stretch - 1.0, noise);
+    GroundFootprint f = GroundFootprint(along, 1e3 * least, stretch - 1.0, noise);
     GroundMaterial m = ground_material(1e3 * at.xy, f);
 
     float open = below_boxes(at), hidden = hidden_by_boxes(at, blur_m);
@@ -44,7 +44,8 @@ vec3 ground_color(vec3 at, vec3 ray, float depth) {
                  ground_lights(at, vec3(0.0, 0.0, 1.0), hidden, blur_m);
     vec3 color = m.albedo * light;
 #if GROUND_WET
-    color += ground_mirror(at, normalize(ray), m) * open;
+    vec3 toward = normalize(ray);
+    color += ground_mirror(at, toward, m) * open + ground_glare(at, toward, m, hidden, blur_m);
 #endif
     return exposure * color;
 }
@@ -63,13 +64,16 @@ vec4 seen_color(vec3 ray, out float depth) {
     color = ground_color(at, ray, isinf(depth) ? 1.0 : depth);
 #endif
 #endif
-#if GROUND_PLANE && LAYER == LAYER_ALL
+#if GROUND_PLANE == 0
+    share = 0.0;
+#elif LAYER != LAYER_ALL
+    share = isinf(depth) ? 0.0 : 1.0;
+#endif
+#if LAYER == LAYER_ALL
     if (share < 1.0) {
         vec3 behind = exposure * background(ray);
         color = share > 0.0 ? mix(behind, color, share) : behind;
     }
-#else
-    share = 1.0;
 #endif
 #if GROUND_PROPS
     PropHit hit = first_prop(ray, depth);
@@ -110,7 +114,7 @@ void main() {
 #else
     vec4 color = seen_color(ground_ray(gl_FragCoord.xy), depth);
 #endif
-    if (isinf(depth)) discard;
+    if (isinf(depth) && color.a == 0.0) discard;
     out_color = vec4(display_color(color.rgb), color.a);
     out_labels = 0u;
     out_depth = depth;

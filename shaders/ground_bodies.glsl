@@ -3,7 +3,8 @@
 // vec3 in_body(vec3 v, int i): a world vector in the axes of body i.
 // float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m): share of a distant disc
 // that body i hides.
-// float body_cover(...; out int face): also the index into face_radiance of the side in front.
+// float body_cover(...; out int face): also the index into face_radiance of the side in front, or 4 for
+// the bottom or top.
 // BodyHit body_hit(vec3 from, vec3 ray, int i): where a ray enters a body.
 
 #include "ground.constants"
@@ -57,7 +58,8 @@ float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m, out 
     vec3 turned = in_body(toward, i), enter;
     float cover = hidden_share(in_body(from - body_center[i].xyz, i), body_half[i].xyz, reciprocal(turned),
                                spread, blur_m, enter);
-    face = enter.x > enter.y ? (turned.x > 0.0 ? 0 : 1) : (turned.y > 0.0 ? 2 : 3);
+    face = enter.z > max(enter.x, enter.y) ? 4
+         : enter.x > enter.y ? (turned.x > 0.0 ? 0 : 1) : (turned.y > 0.0 ? 2 : 3);
     return cover;
 }
 

@@ -2,6 +2,7 @@
 // an even sky that is seen there. See fastgen/light/ground_light.py.
 // float below_boxes(vec3 at): share of that light which reaches below containers with a low gap.
 // float hidden_by_boxes(vec3 at, float blur_m): share of the first directional light that they hide.
+// float hidden_from(int i, vec3 at, float blur_m): share of another directional light that they hide.
 // vec3 ground_lights(vec3 at, vec3 normal, float hidden, float blur_m): irradiance / pi of the
 // directional lights.
 
@@ -40,17 +41,22 @@ float hidden_by_boxes(vec3 at, float blur_m) {
     return hidden;
 }
 
+float hidden_from(int i, vec3 at, float blur_m) {
+    vec4 light = light_direction[i];
+    float hidden = 0.0;
+#define OTHER_LIGHT(k) hidden += body_cover(at, light.xyz, k, light.w, blur_m);
+    EACH_BOX(OTHER_LIGHT)
+    return hidden;
+}
+
 // hidden: Share of the first light that is hidden. blur_m: Radius over which shadows are filtered.
 vec3 ground_lights(vec3 at, vec3 normal, float hidden, float blur_m) {
     if (light_count == 0) return vec3(0.0);
     float facing = max(dot(normal, light_direction[0].xyz), 0.0);
     vec3 sum = light_irradiance[0].rgb * (facing * max(1.0 - hidden, 0.0));
     for (int i = 1; i < LIGHTS; ++i) {
-        vec4 light = light_direction[i];
-        hidden = 0.0;
-#define OTHER_LIGHT(k) hidden += body_cover(at, light.xyz, k, light.w, blur_m);
-        EACH_BOX(OTHER_LIGHT)
-        sum += light_irradiance[i].rgb * (max(dot(normal, light.xyz), 0.0) * max(1.0 - hidden, 0.0));
+        float seen = max(1.0 - hidden_from(i, at, blur_m), 0.0);
+        sum += light_irradiance[i].rgb * (max(dot(normal, light_direction[i].xyz), 0.0) * seen);
     }
     return sum;
 }

@@ -14,16 +14,17 @@ HEAD = "#version 430 core\n" + "".join(
 )
 
 
-def run(gl, body, inputs, textures=None, damage="undamaged", kinds=DRAWN_DAMAGE_CLASSES):
+def run(gl, body, inputs, textures=None, damage="undamaged", kinds=DRAWN_DAMAGE_CLASSES, lights=0):
     """Return `vec4 f(vec4 x)`, defined in GLSL `body`, at each row of inputs [N, 4] as [N, 4]."""
     ctx = gl.ctx
     main = (
         "\nuniform sampler2D inputs; layout(location = 0) out vec4 answer;\n"
         "void main() { answer = f(texelFetch(inputs, ivec2(gl_FragCoord.xy), 0)); }\n"
     )
+    variant = ShaderVariant(damage=damage, kinds=kinds, lights=lights)
     program = ctx.program(
         vertex_shader=expand(shader_text("fullscreen.vert"), ShaderVariant()),
-        fragment_shader=expand(HEAD + body + main, ShaderVariant(damage=damage, kinds=kinds)),
+        fragment_shader=expand(HEAD + body + main, variant),
     )
     rows = np.ascontiguousarray(inputs, np.float32)
     held = {
