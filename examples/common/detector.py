@@ -2,8 +2,8 @@
 
 Centres and their Gaussians follow CenterNet (Zhou et al. 2019). Boxes are trained over the Gaussian
 like in TTFNet (Liu et al. 2020). The first class spans the image and contains the others, so boxes
-and masks have two groups: the first class, and all others. An instance's mask is the mask of its
-group inside its box.
+have two groups: the first class, and all others. An instance's mask is the mask of its class inside
+its box.
 """
 
 import itertools
@@ -25,7 +25,7 @@ _LEAST_SPREAD = 0.3  # cells
 _RARE = 0.01  # initial heat of the maps
 _BOX_WEIGHT = 5.0
 _MASK_WEIGHT = 2.0
-_RARE_MASK_WEIGHT = 4.0  # weight of pixels in the second group, which covers little of an image
+_RARE_MASK_WEIGHT = 4.0  # weight of pixels in classes after the first, which cover little
 _LONGEST_LOG = 6.5  # limit of the logarithm of a side's distance in cells
 _CANDIDATES = 100
 _LEAST_SCORE = 0.01
@@ -73,7 +73,7 @@ class Detector(Learner):
         self.fuse = _conv(width, width * 3 // 2)
         self.heat = nn.Conv2d(width * 3 // 2, classes, 1)
         self.box = nn.Conv2d(width * 3 // 2, 8, 1)
-        self.mask = nn.Conv2d(width * 3 // 2, 2, 1) if masks else None
+        self.mask = nn.Conv2d(width * 3 // 2, classes, 1) if masks else None
         assert self.heat.bias is not None
         nn.init.constant_(self.heat.bias, -math.log(1 / _RARE - 1))
         nn.utils.convert_conv2d_weight_memory_format(self, torch.channels_last)
@@ -87,7 +87,7 @@ class Detector(Learner):
         Returns:
             Float32 maps at a quarter of the image size: heat logits [B, classes, h, w], logarithms
             of the distances to the four sides in cells for both groups [B, 2, 4, h, w], and mask
-            logits [B, 2, h, w] if the detector has masks.
+            logits [B, classes, h, w] if the detector has masks.
         """
         with torch.autocast(pixels.device.type, torch.bfloat16, enabled=_fast_bfloat16(pixels)):
             x = self.stem(pixels.contiguous(memory_format=torch.channels_last))
@@ -170,10 +170,11 @@ class Detector(Learner):
         return torch.stack(images).to(self.heat.weight.device).float() / 127.5 - 1
 
     def _mask_loss(self, logits: torch.Tensor, targets: list[dict[str, Any]]) -> torch.Tensor:
-        wanted = torch.stack([_group_masks(t) for t in targets]).to(logits.device)
+        wanted = torch.stack([_class_masks(t, self.classes) for t in targets]).to(logits.device)
         # cells hold the covered share instead of 0 or 1, so that thin objects do not vanish
         wanted = functional.avg_pool2d(wanted, STRIDE)
-        rare = logits.new_tensor([1.0, _RARE_MASK_WEIGHT])[:, None, None]
+        rare = logits.new_full((self.classes, 1, 1), _RARE_MASK_WEIGHT)
+        rare[0] = 1
         crossed = functional.binary_cross_entropy_with_logits(logits, wanted, pos_weight=rare)
         shares = logits.sigmoid()
         shared = (shares * wanted).sum((0, 2, 3))
@@ -227,12 +228,11 @@ def distinct(boxes: torch.Tensor, classes: torch.Tensor) -> torch.Tensor:
     return kept.to(boxes.device)
 
 
-def _group_masks(target: dict[str, Any]) -> torch.Tensor:
-    """Return the areas covered by the first class and by all others, float32 [2, H, W]."""
-    masks = torch.zeros(2, *target["masks"].shape[1:])
+def _class_masks(target: dict[str, Any], classes: int) -> torch.Tensor:
+    """Return the area that each class covers, float32 [classes, H, W]."""
+    masks = torch.zeros(classes, *target["masks"].shape[1:])
     for label, mask in zip(target["labels"], target["masks"], strict=True):
-        group = int(label > 1)
-        masks[group] = torch.maximum(masks[group], mask.float())
+        masks[label - 1] = torch.maximum(masks[label - 1], mask.float())
     return masks
 
 
@@ -283,7 +283,7 @@ def _boxes(sides: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tenso
 def _instance_masks(
     logits: torch.Tensor, boxes: torch.Tensor, classes: torch.Tensor
 ) -> torch.Tensor:
-    """Return group masks at image size, each cut to its instance's box; bool [N, H, W]."""
+    """Return class masks at image size, each cut to its instance's box; bool [N, H, W]."""
     grown = functional.interpolate(
         logits[None], scale_factor=float(STRIDE), mode="bilinear", align_corners=False
     )[0]
@@ -292,4 +292,4 @@ def _instance_masks(
     y = torch.arange(height, device=boxes.device) + 0.5
     across = (x >= boxes[:, :1]) & (x < boxes[:, 2:3])
     down = (y >= boxes[:, 1:2]) & (y < boxes[:, 3:])
-    return (grown > 0)[(classes > 0).long()] & down[:, :, None] & across[:, None, :]
+    return (grown > 0)[classes] & down[:, :, None] & across[:, None, :]
