@@ -102,13 +102,19 @@ class Feed:
         batch: Items per batch.
         seed: Seed of the order.
         workers: Processes that render. Other items are read in this process.
+        mirror: Mirror a random half of the batches. Targets must have the loader's detection form.
     """
 
     def __init__(
-        self, source: Kept | ContainerDataset, batch: int, seed: int, workers: int = 0
+        self,
+        source: Kept | ContainerDataset,
+        batch: int,
+        seed: int,
+        workers: int = 0,
+        mirror: bool = False,
     ) -> None:
         self._order = torch.Generator()
-        self._seed = seed
+        self._seed, self._mirror = seed, mirror
         self._loader: Any
         if isinstance(source, ContainerDataset):
             options: dict[str, Any] = {"num_workers": workers}
@@ -130,7 +136,24 @@ class Feed:
         self._order.manual_seed(self._seed + number)
         if isinstance(self._loader, Loader):
             self._loader.set_epoch(number)
-        return iter(self._loader)
+        for images, targets in self._loader:
+            if self._mirror and torch.rand((), generator=self._order) < 0.5:
+                yield mirrored(images, targets)
+            else:
+                yield images, targets
+
+
+def mirrored(images: Sequence[torch.Tensor], targets: Sequence[dict[str, Any]]) -> Batch:
+    """Mirror images, uint8 [3, H, W] each, and their boxes and masks at the vertical axis."""
+    found = []
+    for image, target in zip(images, targets, strict=True):
+        x0, y0, x1, y1 = target["boxes"].T
+        width = image.shape[2]
+        one = {**target, "boxes": torch.stack([width - x1, y0, width - x0, y1], dim=1)}
+        if "masks" in target:
+            one["masks"] = target["masks"].flip(2)
+        found.append(one)
+    return [image.flip(2) for image in images], found
 
 
 def collate_texts(batch: Sequence[Any]) -> Batch:

@@ -125,18 +125,21 @@ def start(
     return Run(name, mode, plans[mode], asked.full, asked.results, asked.seed, device)
 
 
-def feed_of(data: ContainerDataset, run: Run, more: Sequence[ContainerDataset] = ()) -> Feed:
+def feed_of(
+    data: ContainerDataset, run: Run, more: Sequence[ContainerDataset] = (), mirror: bool = False
+) -> Feed:
     """Return batches of `data`, rendered anew for each pass or once, as the plan says.
 
-    Images rendered once are followed by those of `more`.
+    Images rendered once are followed by those of `more`. With `mirror`, half of the batches are
+    mirrored.
     """
     plan = run.plan
     if plan.workers:
-        return Feed(data, plan.batch, run.seed, plan.workers)
+        return Feed(data, plan.batch, run.seed, plan.workers, mirror)
     kept = rendered(data, run.cache)
     for other in more:
         kept = kept.with_more(rendered(other, run.cache))
-    return Feed(kept, plan.batch, run.seed)
+    return Feed(kept, plan.batch, run.seed, mirror=mirror)
 
 
 def train(model: Learner, feed: Feed, run: Run) -> list[float]:
