@@ -16,7 +16,7 @@ from typing import Any
 from common import charts, drawing
 from common.damage_recall import Outcome, changes, recall_tables
 from common.data import Kept, in_order, rendered
-from common.detection_metrics import Scores, compressed, operating_point, score
+from common.detection_metrics import Scores, class_scores, compressed, operating_point, score
 from common.detector import Detector
 from common.run import Plan, Run, Table, conclude, feed_of, parameters, start, train
 
@@ -25,7 +25,7 @@ from fastgen.classes import SEGMENTATION_CLASSES
 from fastgen.torch import ContainerDataset, ItemSettings, RenderSettings, SceneSettings
 
 PLANS = {
-    "cpu": Plan(images=1200, test_images=600, size=(640, 640), batch=4, passes=1, rate=1e-3),
+    "cpu": Plan(images=1200, test_images=600, size=(640, 640), batch=4, passes=2, rate=1e-3),
     "full": Plan(
         images=7910, test_images=2480, size=(640, 640), batch=8, passes=20, rate=1e-3, workers=12
     ),
@@ -34,7 +34,7 @@ PLANS = {
 """Sizes of runs, for whole images. `images` and `batch` count pairs in training."""
 
 NEAR_PLANS = {
-    "cpu": Plan(images=6000, test_images=0, size=(256, 256), batch=16, passes=3, rate=2e-3),
+    "cpu": Plan(images=6000, test_images=0, size=(256, 256), batch=16, passes=20, rate=2e-3),
     "full": Plan(
         images=20_000, test_images=0, size=(256, 256), batch=32, passes=20, rate=2e-3, workers=12
     ),
@@ -150,12 +150,12 @@ def class_table(boxes: Scores, masks: Scores) -> Table:
 
 
 def tested(model: Detector, pairs: Kept) -> list[Outcome]:
-    """Return labels, detections and visible change of the damaged image of each pair."""
+    """Return labels, detections and visible change of each pair."""
     found = []
     for k in range(len(pairs)):
         images, (target, _) = pairs[k]
-        one = compressed(model.predict([images[0]])[0])
-        found.append(Outcome(target, one, changes(images, target)))
+        damaged, undamaged = (compressed(model.predict([image])[0]) for image in images)
+        found.append(Outcome(target, damaged, undamaged, changes(images, target)))
     return found
 
 
@@ -166,8 +166,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     shape = {"width": 96, "blocks": 3} if run.full else {"width": 32, "blocks": 1}
     model = Detector(len(SEGMENTATION_CLASSES), masks=True, **shape)
     near = replace(run, plan=NEAR_PLANS[run.mode])
-    losses = train(model, feed_of(near_data(near), near), near)
-    losses += train(model, feed_of(training_data(run), run), run)
+    losses = train(model, feed_of(near_data(near), near, mirror=True), near)
+    losses += train(model, feed_of(training_data(run), run, mirror=True), run)
 
     test = test_data(run)
     targets = [test[i][1] for i in range(len(test))]
@@ -191,7 +191,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         summary_table("box", boxes),
         summary_table("mask", masks),
         class_table(boxes, masks),
-        *recall_tables(tested(model, damaged_data(run)), least),
+        *recall_tables(tested(model, damaged_data(run)), class_scores(boxes)),
     ]
     more = {
         "parameters": parameters(model),

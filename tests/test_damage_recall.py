@@ -70,19 +70,24 @@ def test_damages_are_counted_by_kind_size_and_change():
     second = labelled(container, (2, bar))
     detected = found(first, 0, 1, 3)
     detected["masks"][2] = False  # the right box with another mask
+    detected["scores"][2] = 0.4
+    alarms = {**found(first, 0, 1, 3), "scores": torch.tensor([1.0, 0.6, 0.2])}
     tested = [
-        Outcome(first, detected, np.array([99.0, 5.0, 10.0, 40.0])),
-        Outcome(second, found(second, 0), np.array([99.0, 31.9])),
+        Outcome(first, detected, alarms, np.array([99.0, 5.0, 10.0, 40.0])),
+        Outcome(second, found(second, 0), found(second, 0), np.array([99.0, 31.9])),
     ]
-    usual, by_size, by_change = recall_tables(tested, 0.5)
+    usual, by_size, by_change = recall_tables(tested, [0.5, 0.5, 0.5, 0.5, 0.3])
     shares = {row[0]: row[1:] for row in usual.rows}
-    assert shares["all damages"] == [4, 50.0, 25.0]
-    assert shares["axis"] == [3, pytest.approx(100 / 3), pytest.approx(100 / 3)]
-    assert shares["small"] == [2, 50.0, 50.0]
-    assert shares["larger"] == [2, 50.0, 0.0]
-    assert shares["thin"] == shares["small and thin"] == [1, 0.0, 0.0]
-    assert shares["not thin"] == [3, pytest.approx(200 / 3), pytest.approx(100 / 3)]
-    assert np.isnan(shares["dented"][1])
+    assert shares["all damages"] == ["–", 4, 50.0, 25.0, 1]
+    assert shares["axis"] == ["0.50", 3, pytest.approx(100 / 3), pytest.approx(100 / 3), 1]
+    assert shares["perforation"] == ["0.30", 1, 100.0, 0.0, 0]
+    assert shares["small"] == ["–", 2, 50.0, 50.0, "–"]
+    assert shares["larger"] == ["–", 2, 50.0, 0.0, "–"]
+    assert shares["thin"] == shares["small and thin"] == ["–", 1, 0.0, 0.0, "–"]
+    assert shares["not thin"] == ["–", 3, pytest.approx(200 / 3), pytest.approx(100 / 3), "–"]
+    assert np.isnan(shares["dented"][2])
+    _, by_size_strict, _ = recall_tables(tested, [0.5] * 5)
+    assert by_size_strict.rows[0][1:] == ["1 of 2", "0 of 0", "0 of 1", "0 of 1"]
     assert by_size.heads == ["damages", "below 16 px", "16 to 32", "32 to 64", "64 px or more"]
     sizes = {row[0]: row[1:] for row in by_size.rows}
     assert sizes["all damages"] == ["1 of 2", "0 of 0", "0 of 1", "1 of 1"]

@@ -14,8 +14,15 @@ import pytest
 import torch
 from common import detector
 from common.boxes import generalized_iou, iou
-from common.data import Feed, Kept, rendered
-from common.detection_metrics import compressed, confusion, hits, operating_point, score
+from common.data import Feed, Kept, mirrored, rendered
+from common.detection_metrics import (
+    class_scores,
+    compressed,
+    confusion,
+    hits,
+    operating_point,
+    score,
+)
 from common.detector import STRIDE, Detector, distinct, gaussians
 from common.run import Table
 from pycocotools import mask as coco_mask
@@ -112,6 +119,50 @@ def test_operating_point_drops_detections_that_cost_more_precision_than_they_add
     assert (point.mean_precision, point.mean_recall) == (100, 100)
 
 
+def test_each_class_has_a_score_that_keeps_its_right_detections_and_drops_wrong_ones():
+    target = labels((1, 0, 0, 20, 20), (2, 100, 0, 120, 20))
+    one = (0.8, 1, 0, 0, 20, 20), (0.6, 1, 50, 0, 70, 20)
+    two = (0.3, 2, 100, 0, 120, 20), (0.1, 2, 50, 0, 70, 20)
+    least = class_scores(score([target], [detections(*one, *two)], NAMES, SIZE))
+    assert 0.6 < least[0] <= 0.8
+    assert 0.1 < least[1] <= 0.3
+    assert hits(target, detections(*one, *two), least).tolist() == [True, True]
+    assert hits(target, detections(*one, *two), [0.9, 0.2, 0.2]).tolist() == [False, True]
+
+
+def test_mirrored_images_and_labels_stay_together():
+    image = torch.zeros(3, 4, 10, dtype=torch.uint8)
+    image[:, 1:3, 2:5] = 9
+    target = labels((2, 2, 1, 5, 3), masks=[image[0] // 9])
+    (found,), (one,) = mirrored([image], [target])
+    x0, y0, x1, y1 = one["boxes"][0].int().tolist()
+    assert (found[:, y0:y1, x0:x1] == 9).all()
+    assert int((found > 0).sum()) == 3 * (x1 - x0) * (y1 - y0)
+    assert (one["masks"][0] == found[0] // 9).all()
+    (again,), (same,) = mirrored([found], [one])
+    assert (again == image).all()
+    assert (same["boxes"] == target["boxes"]).all()
+
+
+def test_half_of_the_batches_are_mirrored_in_an_order_that_depends_on_the_pass():
+    image = torch.zeros(3, 1, 2, dtype=torch.uint8)
+    image[:, :, 0] = 1
+    items = [{"jpeg": None, "target": None}] * 40
+
+    class Same(Kept):
+        def __getitem__(self, position):
+            return image, labels((1, 0, 0, 1, 1))
+
+    def seen(number, mirror=True):
+        feed = Feed(Same(items), 1, seed=2, mirror=mirror)
+        return [int(images[0][0, 0, 1]) for images, _ in feed.passed(number)]
+
+    assert seen(0) == seen(0)
+    assert seen(0) != seen(1)
+    assert 8 < sum(seen(0)) < 32
+    assert sum(seen(0, mirror=False)) == 0
+
+
 def test_confusion_counts_the_class_detected_at_each_label_and_missed_labels():
     target = labels((1, 0, 0, 200, 100), (2, 0, 0, 200, 98), (3, 10, 10, 30, 30), (3, 60, 0, 70, 9))
     ends = (0.9, 1, 0, 0, 200, 99), (0.8, 3, 0, 0, 198, 98)
@@ -132,7 +183,7 @@ def test_hits_are_the_labels_that_pycocotools_matches(masks):
         targets.append(labels(*things, masks=filled[0]))
         found.append(detections(*guesses, masks=filled[1]))
     scored = score(targets, found, NAMES, SIZE, masks).scored
-    own = [hits(t, f, 0.0, masks) for t, f in zip(targets, found, strict=True)]
+    own = [hits(t, f, [0.0] * 3, masks) for t, f in zip(targets, found, strict=True)]
     for k in range(3):
         of_class = [(t["labels"] == k + 1).numpy() for t in targets]
         ours = sum(int(h[c].sum()) for h, c in zip(own, of_class, strict=True))
@@ -220,8 +271,8 @@ def test_a_detector_trained_on_one_image_finds_its_box():
         model.loss([image, image], [target, target]).backward()
         optimizer.step()
     best = {name: value[:1] for name, value in model.predict([image, image])[0].items()}
-    assert hits(target, best, 0.3).all()
-    assert hits(target, best, 0.3, masks=True).all()
+    assert hits(target, best, [0.3] * 2).all()
+    assert hits(target, best, [0.3] * 2, masks=True).all()
 
 
 def test_precision_and_recall_of_doors():
@@ -281,7 +332,8 @@ def test_compressed_masks_give_the_same_scores():
     plain, same = (score([target], [each], NAMES, SIZE, masks=True) for each in (found, small))
     assert plain.summary == pytest.approx(same.summary, nan_ok=True)
     assert 0 < plain.summary["AP"] < 100
-    assert (hits(target, small, 0.5, masks=True) == hits(target, found, 0.5, masks=True)).all()
+    least = [0.5] * 2
+    assert (hits(target, small, least, masks=True) == hits(target, found, least, masks=True)).all()
 
 
 def test_maps_in_bfloat16_are_close_to_those_in_float32(monkeypatch):

@@ -35,11 +35,13 @@ class Outcome(NamedTuple):
     Attributes:
         target: Labels in the loader's detection form, with masks.
         found: Detections.
+        undamaged: Detections in the same image without damages.
         change: Change of the image by each labelled object [N], see `changes`.
     """
 
     target: Mapping[str, Any]
     found: Found
+    undamaged: Found
     change: NDArray[np.float64]
 
 
@@ -71,14 +73,15 @@ def slenderness(mask: NDArray[np.uint8]) -> float:
     return float(sides.max() / sides.min())
 
 
-def recall_tables(outcomes: Sequence[Outcome], least: float) -> list[Table]:
+def recall_tables(outcomes: Sequence[Outcome], least: Sequence[float]) -> list[Table]:
     """Return three tables of the damages found at an IoU of 0.5.
 
-    They list shares by kind and shape, and numbers by size and by change of the image.
+    They list shares by kind and shape, with the detections in undamaged images, and numbers by size
+    and by change of the image.
 
     Args:
         outcomes: Labels and detections by image.
-        least: Smallest score that counts.
+        least: Smallest score of each class that counts.
     """
     labels = _joined(outcomes, lambda each: each.target["labels"].numpy())
     areas = _joined(outcomes, lambda each: each.target["area"].numpy())
@@ -86,19 +89,23 @@ def recall_tables(outcomes: Sequence[Outcome], least: float) -> list[Table]:
     change = _joined(outcomes, lambda each: each.change)
     by_box = _joined(outcomes, lambda each: hits(each.target, each.found, least))
     by_mask = _joined(outcomes, lambda each: hits(each.target, each.found, least, masks=True))
+    alarms = _joined(outcomes, lambda each: _counted(each.undamaged, least))
     damages, small = labels > 1, areas < SMALL_PX
-    kinds = {"all damages": damages}
-    kinds |= {name: labels == k for k, name in enumerate(SEGMENTATION_CLASSES, start=1) if k > 1}
+    numbers = {name: k for k, name in enumerate(SEGMENTATION_CLASSES, start=1) if k > 1}
+    kinds = {"all damages": damages, **{name: labels == k for name, k in numbers.items()}}
     shapes = {"small": small, "larger": ~small, "thin": thin, "not thin": ~thin}
     shapes["small and thin"] = small & thin
-    rows = [
-        [name, int(chosen.sum()), _percent(by_box[chosen]), _percent(by_mask[chosen])]
-        for name, chosen in {**kinds, **{name: damages & s for name, s in shapes.items()}}.items()
-    ]
-    title = f"Damages found at an IoU of 0.5 and a score of {least:.2f}, %"
+    shapes = {name: damages & chosen for name, chosen in shapes.items()}
+    rows: list[list[object]] = []
+    for name, chosen in {**kinds, **shapes}.items():
+        found = [int(chosen.sum()), _percent(by_box[chosen]), _percent(by_mask[chosen])]
+        k = numbers.get(name)
+        false = int((alarms == k if k else alarms > 1).sum()) if name in kinds else "–"
+        rows.append([name, f"{least[k - 1]:.2f}" if k else "–", *found, false])
+    heads = ["damages", "score", "labels", "by box, %", "by mask, %", "in undamaged images"]
     size_title = "Damages found by box, by size (square root of the visible pixels)"
     return [
-        Table(title, ["damages", "labels", "by box", "by mask"], rows),
+        Table("Damages found at an IoU of 0.5", heads, rows),
         _numbers(size_title, kinds, by_box, _Groups(np.sqrt(areas), SIZES_PX, "px")),
         _numbers(
             "Damages found by box, by change of the image (8-bit levels)",
@@ -107,6 +114,13 @@ def recall_tables(outcomes: Sequence[Outcome], least: float) -> list[Table]:
             _Groups(change, CHANGES, "levels"),
         ),
     ]
+
+
+def _counted(found: Found, least: Sequence[float]) -> NDArray[np.int64]:
+    """Return the labels of the detections that count [N]."""
+    labels = found["labels"].numpy()
+    counted: NDArray[np.int64] = labels[found["scores"].numpy() >= np.asarray(least)[labels - 1]]
+    return counted
 
 
 class _Groups(NamedTuple):

@@ -38,6 +38,9 @@ _SUMMARY = {
 }
 """Index in COCOeval's statistics of each name in the paper's Tables 4 to 7."""
 
+_THRESHOLDS = np.linspace(0.01, 0.99, 99)
+"""Scores at which precision and recall are measured."""
+
 
 @dataclass(frozen=True)
 class Scores:
@@ -178,18 +181,19 @@ def matched(
 
 def operating_point(scores: Scores) -> OperatingPoint:
     """Return the score with the best F1, averaged over the classes, as YOLOv7 reports P and R."""
-    thresholds = np.linspace(0.01, 0.99, 99)
-    curves = [_curve(thresholds, *each) for each in scores.scored]
-    precision = np.array([p for p, _ in curves])
-    recall = np.array([r for _, r in curves])
-    f1 = 2 * precision * recall / np.maximum(precision + recall, 1e-9)
+    precision, recall, f1 = _curves(scores)
     labelled = [k for k, each in enumerate(scores.scored) if each[2]]
-    best = int(np.nan_to_num(f1[labelled]).mean(axis=0).argmax()) if labelled else 0
+    best = int(f1[labelled].mean(axis=0).argmax()) if labelled else 0
     return OperatingPoint(
-        score=float(thresholds[best]),
+        score=float(_THRESHOLDS[best]),
         precision=(100 * precision[:, best]).tolist(),
         recall=(100 * recall[:, best]).tolist(),
     )
+
+
+def class_scores(scores: Scores) -> list[float]:
+    """Return the score of each class with its best F1."""
+    return _THRESHOLDS[_curves(scores)[2].argmax(axis=1)].tolist()
 
 
 def confusion(
@@ -223,12 +227,12 @@ def confusion(
 
 
 def hits(
-    target: Mapping[str, Any], each: Found, least_score: float, masks: bool = False
+    target: Mapping[str, Any], each: Found, least: Sequence[float], masks: bool = False
 ) -> NDArray[np.bool_]:
     """Return which labels of one image are found, bool [N].
 
-    A detection must have the label's class and an IoU of at least 0.5. Best detections come first,
-    and each takes the free label with the largest overlap.
+    A detection must have the label's class, at least its score in `least`, and an IoU of at least
+    0.5. Best detections come first, and each takes the free label with the largest overlap.
     """
     order = each["scores"].argsort(descending=True, stable=True).tolist()
     overlap = _mask_iou(each["masks"], target["masks"]) if masks else None
@@ -237,7 +241,7 @@ def hits(
     hit = np.zeros(len(target["labels"]), bool)
     for i in order:
         same = (target["labels"] == each["labels"][i]).numpy() & ~hit
-        if float(each["scores"][i]) < least_score or not same.any():
+        if float(each["scores"][i]) < least[int(each["labels"][i]) - 1] or not same.any():
             continue
         j = int(np.where(same, overlap[i], -1).argmax())
         hit[j] = overlap[i, j] >= 0.5
@@ -302,17 +306,25 @@ def _scored(
     return values[counted], hit[counted], labels
 
 
+def _curves(scores: Scores) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return precision, recall and F1 in 0..1 of each class at each of _THRESHOLDS.
+
+    Precision and recall are nan without detections or labels; F1 is 0 then.
+    """
+    curves = [_curve(*each) for each in scores.scored]
+    precision = np.array([p for p, _ in curves])
+    recall = np.array([r for _, r in curves])
+    f1 = 2 * precision * recall / np.maximum(precision + recall, 1e-9)
+    return precision, recall, np.nan_to_num(f1)
+
+
 def _curve(
-    thresholds: NDArray[np.float64],
-    values: NDArray[np.float64],
-    hit: NDArray[np.bool_],
-    labels: int,
+    values: NDArray[np.float64], hit: NDArray[np.bool_], labels: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return precision and recall in 0..1 at each threshold; nan without detections or labels."""
-    kept = values[None] >= thresholds[:, None]
+    kept = values[None] >= _THRESHOLDS[:, None]
     right, called = (kept & hit).sum(axis=1), kept.sum(axis=1)
     precision = np.where(called > 0, right / np.maximum(called, 1), np.nan)
-    return precision, right / labels if labels else np.full(len(thresholds), np.nan)
+    return precision, right / labels if labels else np.full(len(_THRESHOLDS), np.nan)
 
 
 def _mean(values: NDArray[np.float64]) -> float:
