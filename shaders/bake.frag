@@ -22,6 +22,7 @@ layout(location = 1) out vec4 out_surface;   // Unused, roughness, metallic: glT
 void main() {
     Scar scar = NO_SCAR;
 #if WITH_DAMAGE
+    mark_filter_mm = texel_mm;
     scar = damage_at(rest_mm).scar;
 #endif
     DecalHit decal = NO_DECAL;

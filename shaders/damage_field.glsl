@@ -1,9 +1,13 @@
 // DamageField: displacement of one damage. DamageMark: surface of a damage without displacement.
 // float sheet_fade(float w): weight of a field. float damage_fresh(int i): Damage.fresh of damage i.
+// float mark_filter_mm: width on the sheet over which patterns of marks are filtered; set it before
+// damage_at().
 // Functions for the forms of damage in damage_*.glsl. Twin of fastgen/damages/fields.py.
 
 #include "damage.constants"
 #include "damage.block"
+
+float mark_filter_mm = 1.0;
 
 struct DamageField {
     float amount;   // Displacement along the inward axis, mm.

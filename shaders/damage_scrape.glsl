@@ -13,6 +13,9 @@ bool scraped(int i, vec3 q) {
     return outside < 0.0 && in_contact(q.z, a.z);
 }
 
+// Mean wear of many scratches of a layer, as a factor of their density.
+const float SCRATCH_MEAN = 0.16;
+
 // Two layers of scratches that spread like a fan. Each cell of height `pitch` across has one, of its
 // own length and depth. Few are deep, and neighbours resemble each other: what scraped had few
 // points. Scratches end within the scrape.
@@ -24,7 +27,8 @@ float scrape_wear(int i, vec3 q) {
     float fan = 1.0 + 0.3 * sin(7.0 * b.x) * q.x / half_length;
     float wear = 0.0;
     for (int layer = 0; layer < 2; ++layer) {
-        float across = (q.y + wave * float(1 - layer)) * fan / a.x * (layer == 0 ? 1.0 : 0.37);
+        float scale = fan / a.x * (layer == 0 ? 1.0 : 0.37);
+        float across = (q.y + wave * float(1 - layer)) * scale, filter_width = mark_filter_mm * scale;
         float cell = floor(across);
         // Each scrape and layer has random numbers of its own, from a whole number.
         float own = 4.0 * floor(1000.0 * b.x) + 2.0 * float(layer);
@@ -33,9 +37,13 @@ float scrape_wear(int i, vec3 q) {
         float middle = (half_length - reach) * clamp(2.0 * group.y - 1.0 + 0.6 * (draw.y - 0.5), -1.0, 1.0);
         float along = clamp(3.0 - 3.0 * abs(q.x - middle) / reach, 0.0, 1.0);
         float thickness = mix(0.15, 0.5, draw.w * along);
-        float profile = clamp(2.0 - 2.0 * abs(across - cell - 0.5) / thickness, 0.0, 1.0);
+        // A band with soft edges, filtered by a box. Wide boxes see many scratches.
+        float width = max(filter_width, 0.5 * thickness), from_middle = across - cell - 0.5;
+        float low = max(from_middle - 0.5 * width, -0.75 * thickness);
+        float profile = max(min(from_middle + 0.5 * width, 0.75 * thickness) - low, 0.0) / width;
         float depth = draw.x < a.y * mix(0.6, 1.4, group.z) ? mix(0.5, 1.0, draw.w) : 0.0;
-        wear = max(wear, along * profile * depth);
+        float one = along * profile * depth, many = SCRATCH_MEAN * a.y;
+        wear += (1.0 - wear) * mix(one, many, smoothstep(0.6, 1.8, filter_width));
     }
     return wear;
 }

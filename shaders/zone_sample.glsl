@@ -39,6 +39,7 @@ ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
     p.depth = texelFetch(surface_depths, sample_at, 0).r;
     p.scar = NO_SCAR;
 #if WITH_DAMAGE
+    mark_filter_mm = p.depth * pixel_angle * 1000.0 * inversesqrt(max(dot(normal, view), 0.05));
     DamageSample d = damage_at(rest_at(sample_at));
     if (d.value != 0u) p.damage = d.value;
     p.scar = d.scar;
