@@ -37,8 +37,8 @@ class RayPass:
     The textures hold two halves of cells: the surface at the middle pixel of each cell, then
     another surface where a cell sees several. Embree casts the rays on the CPU.
 
-    Reads: the visibility buffer and the material tables. Writes: point_keys, point_places and
-    point_light.
+    Reads: the visibility buffer and the material tables. Writes: ray_point_ids,
+    ray_point_positions and ray_point_light.
     """
 
     def __init__(self, gl: GLContext, programs: Programs, size: tuple[int, int]) -> None:
