@@ -1,9 +1,12 @@
 """Measure what a GPU gains: rates to disk, to a training loop and into CUDA memory.
 
     python bench/gpu.py [--qualities draft,balanced] [--size 640x640] [--images 120]
-        [--processes N] [--device-index N]
+        [--batch 16] [--processes N] [--device-index N]
 
 Measures for each quality, with warm caches (lights, meshes and programs):
+
+Labelled frames per second and CPU time per frame of `Generator.render`, and of
+`Generator.render_batch` with --batch images at a time. Needs no NVIDIA GPU.
 
 GPU time of a draw, from its first command to its last, and CPU time to issue the commands.
 
@@ -16,8 +19,8 @@ included.
 Images per second of `fastgen generate` with N workers, over the last two thirds of the run.
 
 N defaults to the number of cores. Some frames in CUDA memory are compared with `Generator.render`.
-Without an NVIDIA GPU, prints the reason and measures only the rate to disk. Needs PyTorch. On a
-GPU, writes the table in docs/scale.md and bench/results/gpu.json.
+Without an NVIDIA GPU, prints the reason, and measures only `render`, `render_batch` and the rate to
+disk. Needs PyTorch. On a GPU, writes the table in docs/scale.md and bench/results/gpu.json.
 """
 
 import argparse
@@ -52,10 +55,25 @@ LONGEST_S = 300
 
 
 @dataclass(frozen=True)
+class Labelled:
+    """Speed of one process that renders labelled frames.
+
+    Attributes:
+        rate: Frames per second.
+        cpu_ms: CPU time of the process per frame.
+    """
+
+    rate: float
+    cpu_ms: float
+
+
+@dataclass(frozen=True)
 class Row:
     """Results of one quality.
 
     Attributes:
+        single: Frames of `render`.
+        batch: Frames of `render_batch`.
         gpu_ms: GPU time of a draw.
         cpu_ms: CPU time to issue the commands of a draw.
         same: Number of COMPARED frames that are bit-identical in CUDA memory and from `render`.
@@ -66,6 +84,8 @@ class Row:
     """
 
     quality: str
+    single: Labelled
+    batch: Labelled
     gpu_ms: float
     cpu_ms: float
     same: int
@@ -113,6 +133,29 @@ def count_same(generator: Generator) -> int:
         ]
         same += all(np.array_equal(*pair) for pair in pairs)
     return same
+
+
+def labelled_frames(generator: Generator, images: int, batch: int) -> tuple[Labelled, Labelled]:
+    """Return the speed of `render` and of `render_batch`.
+
+    Both take turns, batch by batch, so that load of other processes affects both alike.
+    """
+    seconds, cpu = np.zeros(2), np.zeros(2)
+    for first in range(0, images, batch):
+        indices, cameras = zip(*map(shown, range(first, min(first + batch, images))), strict=True)
+        # the first one of a pair samples the scenes and loads their lights
+        generator.render_batch(indices, cameras)
+        for way in (0, 1) if first // batch % 2 else (1, 0):
+            began, used = time.perf_counter(), time.process_time()
+            if way:
+                generator.render_batch(indices, cameras)
+            else:
+                for each in zip(indices, cameras, strict=True):
+                    generator.render(*each)
+            seconds[way] += time.perf_counter() - began
+            cpu[way] += time.process_time() - used
+    single, batched = zip((images / seconds).tolist(), (1e3 * cpu / images).tolist(), strict=True)
+    return Labelled(*single), Labelled(*batched)
 
 
 def draw_ms(generator: Generator, images: int) -> tuple[float, float]:
@@ -212,12 +255,14 @@ def measure(options: argparse.Namespace, quality: str) -> Row:
     """Measure one quality."""
     disk = disk_rate(options, quality)
     with opened(options, quality) as generator:
+        single, batch = labelled_frames(generator, options.images, options.batch)
         same = count_same(generator)
         fill_tensors(generator, options.images)
         began, ended = fill_tensors(generator, options.images)
         gpu_ms, cpu_ms = draw_ms(generator, options.images)
     alone, together = options.images / (ended - began), rate_together(options, quality)
-    return Row(quality, gpu_ms, cpu_ms, same, alone, together, loader_rate(options, quality), disk)
+    loader = loader_rate(options, quality)
+    return Row(quality, single, batch, gpu_ms, cpu_ms, same, alone, together, loader, disk)
 
 
 def table(rows: list[Row], about: str, options: argparse.Namespace) -> list[str]:
@@ -227,12 +272,14 @@ def table(rows: list[Row], about: str, options: argparse.Namespace) -> list[str]
         f"Images of {options.size} on {about}",
         f"(`python bench/gpu.py`); {many} processes or workers where not stated otherwise:",
         "",
-        "| quality | GPU ms per draw | CPU ms per draw | frames/s into CUDA, 1 process | "
+        "| quality | `render`, frames/s, CPU ms | `render_batch`, frames/s, CPU ms | "
+        "GPU ms per draw | CPU ms per draw | frames/s into CUDA, 1 process | "
         f"{many} processes | Loader, images/s | to disk, images/s |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in rows:
-        cells = [f"{row.gpu_ms:.2f}", f"{row.cpu_ms:.1f}"]
+        cells = [f"{each.rate:.0f}, {each.cpu_ms:.1f}" for each in (row.single, row.batch)]
+        cells += [f"{row.gpu_ms:.2f}", f"{row.cpu_ms:.1f}"]
         cells += [f"{rate:.0f}" for rate in (row.alone, row.together, row.loader, row.disk)]
         lines.append("| " + " | ".join([f"`{row.quality}`", *cells]) + " |")
     same, compared = sum(row.same for row in rows), COMPARED * len(rows)
@@ -249,12 +296,15 @@ def main() -> None:
     parser.add_argument("--qualities", default="draft,balanced")
     parser.add_argument("--size", default="640x640")
     parser.add_argument("--images", type=int, default=120, help="images per process")
+    parser.add_argument("--batch", type=int, default=16, help="images per call of render_batch")
     parser.add_argument("--processes", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--device-index", type=int, help="GPU to use, in the order of EGL devices")
     options = parser.parse_args()
     parse_size(options.size)
-    if options.processes < 1 or options.images < 3 * SHARD:
-        raise SystemExit(f"--processes must be at least 1 and --images at least {3 * SHARD}")
+    if min(options.processes, options.batch) < 1 or options.images < 3 * SHARD:
+        raise SystemExit(
+            f"--processes and --batch must be at least 1, --images at least {3 * SHARD}"
+        )
     with Generator(backend="egl", device_index=options.device_index) as generator:
         driver, reason = generator.renderer_name, generator.cuda_reason()
     if not reason and not torch.cuda.is_available():
@@ -267,6 +317,12 @@ def main() -> None:
     if reason:
         print(f"CUDA not measured: {reason}")
         for quality in qualities:
+            with opened(options, quality) as generator:
+                frames = labelled_frames(generator, options.images, options.batch)
+            for name, each in zip(("render", "render_batch"), frames, strict=True):
+                print(
+                    f"{quality}: {name} {each.rate:.1f} frames/s, {each.cpu_ms:.1f} ms of CPU time"
+                )
             print(f"{quality}: {disk_rate(options, quality):.1f} images/s to disk", flush=True)
         return
     rows = []

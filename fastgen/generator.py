@@ -1,30 +1,28 @@
 """Generator: the public way from (config, seed, index) to a labelled Sample."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, Self
 
+from fastgen.batch import items_of
 from fastgen.camera.projection import view_of
-from fastgen.camera.sensor import apply_camera_model, is_needed, needs_radiance
-from fastgen.classes import with_marks
 from fastgen.config.config import Config, LabelConfig
 from fastgen.decals.own_art import art_of
 from fastgen.decals.own_fonts import OwnPrints
 from fastgen.errors import ConfigError, nearest
+from fastgen.finishing import labelled, with_camera_model, with_radiance
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.labels.background import background_objects
-from fastgen.labels.objects import label
-from fastgen.labels.visibility import Shot
 from fastgen.light.container_map import ContainerMap, container_map_path, load_container_map
 from fastgen.light.environment import EnvironmentLight, load_environment
-from fastgen.light.exposure import airlight
 from fastgen.light.hdri import bundled_hdris, bundled_weights, content_hash, hdris_by_name
-from fastgen.postprocess import imported, postprocessed
+from fastgen.postprocess import imported
 from fastgen.preload import preload
+from fastgen.render.batch_readback import chunks
 from fastgen.render.cuda import CudaFrame, cuda_reason
+from fastgen.render.draw_inputs import ImageRequest
 from fastgen.render.gl import open_context
 from fastgen.render.passes.bake import Atlas
 from fastgen.render.renderer import Renderer
@@ -33,7 +31,7 @@ from fastgen.render.settings import QUALITY, RenderSettings
 from fastgen.render.variant import LAYERS
 from fastgen.sample import Sample
 from fastgen.sampling.lens_check import check_lenses
-from fastgen.sampling.scene import sample_scene, stream
+from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Camera, Scene
 from fastgen.scene.check import OwnDecals, check_camera, check_scene
 from fastgen.validation import check_fields, check_known, whole
@@ -204,48 +202,57 @@ class Generator:
             ContextError: There is no OpenGL.
             FastgenError: The function `config.postprocess` fails.
         """
-        if labels is not None:
-            labels = check_fields(labels, LabelConfig, "labels")
+        config = self._labelling(labels)
         check_known("layer", layer, LAYERS)
         prepared, camera = self._chosen(index, camera, scene)
-        scene, view = prepared.scene, view_of(camera, self.size)
-        with self.gpu.drawing() as renderer:
-            modelled = layer == "all" and is_needed(camera, scene.weather)
-            radiance = modelled and needs_radiance(camera, scene.weather)
-            frame = renderer.render(prepared, camera, self.size, layer, radiance, normals)
-            if modelled:
-                exposure = renderer.exposure(scene, camera, self.size)
-                light = renderer.ambient(scene.environment)
-                air = airlight(light, scene.environment.yaw_deg, exposure.factor)
-                image = apply_camera_model(
-                    frame, view, camera, scene.weather, air, exposure, scene.ground
-                )
-                frame = replace(frame, image=image)
-        config = self.config if labels is None else replace(self.config, labels=labels)
-        shot = Shot(frame, prepared, view, config)
-        objects, background = label(shot), None
-        containers = self.container_map(scene.environment.name)
-        if containers is not None and config.labels.background != "none":
-            more, background = background_objects(shot, containers)
-            objects += more
-        sample = Sample(
-            image=frame.image,
-            cover=frame.cover,
-            ids=frame.ids,
-            damage=frame.damage,
-            depth=frame.depth,
-            scene=scene,
-            camera=camera,
-            view=view,
-            objects=objects,
-            normals=frame.normals,
-            background=background,
-            marker_classes=with_marks(config.markings.detection_classes),
-        )
-        if not config.postprocess or layer != "all":
-            return sample
-        rng = stream(scene.seed, scene.index, f"postprocess.{camera.name}")
-        return postprocessed(sample, config.postprocess, rng)
+        image = self._request(prepared, camera, layer, normals)
+        return self._rendered([image], config)[0]
+
+    def render_batch(
+        self,
+        indices: Iterable[int] | None = None,
+        cameras: Iterable[str | Camera | None] | str | Camera | None = None,
+        scenes: Iterable[Scene] | None = None,
+        layer: str = "all",
+        normals: bool = False,
+        labels: LabelConfig | None = None,
+    ) -> list[Sample]:
+        """Render several labelled images, equal to those of `render`.
+
+        Each scene is prepared once, in any order of the images. Images are drawn one after the
+        other. On a GPU, the CPU waits once for up to 16 images instead of once for each image.
+
+        Args:
+            indices: Number of the scene of each image; numbers may repeat. Give either this or
+                `scenes`.
+            cameras: Camera of each image, a name or a Camera; or one for all images. By default,
+                and for None, it is the first camera of the scene.
+            scenes: Scene of each image.
+            layer: As for `render`, for all images.
+            normals: As for `render`, for all images.
+            labels: As for `render`, for all images.
+
+        Returns:
+            The samples in the order of the arguments, about 5 MB each at 640x640.
+
+        Raises:
+            ConfigError: An argument is not valid or a scene cannot be drawn. Nothing is drawn if
+                the message begins with the position of an image, as in "image 2 of the batch".
+            ContextError: There is no OpenGL.
+            FastgenError: The function `config.postprocess` fails.
+        """
+        config = self._labelling(labels)
+        check_known("layer", layer, LAYERS)
+        items, images = items_of(indices, cameras, scenes), []
+        for item in items:
+            try:
+                chosen = self._chosen(item.index, item.camera, item.scene)
+                images.append(self._request(*chosen, layer, normals))
+            except ConfigError as error:
+                raise ConfigError(f"image {item.number} of the batch: {error}") from None
+        samples = zip(items, self._rendered(images, config), strict=True)
+        found = {item.number: sample for item, sample in samples}
+        return [found[number] for number in range(len(items))]
 
     def render_cuda(
         self,
@@ -337,6 +344,30 @@ class Generator:
 
     def __setstate__(self, arguments: dict[str, Any]) -> None:
         self.__init__(**arguments)  # type: ignore[misc]
+
+    def _labelling(self, labels: LabelConfig | None) -> Config:
+        """Return the configuration with other rules of labels, if there are any."""
+        if labels is None:
+            return self.config
+        return replace(self.config, labels=check_fields(labels, LabelConfig, "labels"))
+
+    def _request(
+        self, prepared: PreparedScene, camera: Camera, layer: str, normals: bool
+    ) -> ImageRequest:
+        view = view_of(camera, self.size)
+        return with_radiance(ImageRequest(prepared, camera, view, layer, normals=normals))
+
+    def _rendered(self, images: list[ImageRequest], config: Config) -> list[Sample]:
+        """Render images and label them by the rules of a configuration."""
+        samples: list[Sample] = []
+        for chunk in chunks(images):
+            with self.gpu.drawing() as renderer:
+                drawn = zip(renderer.render_batch(chunk), chunk, strict=True)
+                frames = [with_camera_model(frame, image, renderer) for frame, image in drawn]
+            for frame, image in zip(frames, chunk, strict=True):
+                containers = self.container_map(image.prepared.scene.environment.name)
+                samples.append(labelled(frame, image, config, containers))
+        return samples
 
     def _chosen(
         self, index: int | None, camera: str | Camera | None, scene: Scene | None

@@ -25,7 +25,7 @@ from fastgen.render.regions import (
 )
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.visibility_buffer import VisibilityBuffer
-from fastgen.scene import Damage
+from fastgen.scene import Camera, Damage
 from fastgen.scene.damage_kinds import form_of
 from fastgen.scene.faces import CORRUGATED_ALONG_Y, FACE_AXES
 from fastgen.scene.limits import MM
@@ -36,6 +36,26 @@ _LEAST_FACING = 0.02
 
 _LARGEST_BULGE_MM = 250.0
 """Distance outside a container that damage hardly ever reaches."""
+
+
+class ImageRequest(NamedTuple):
+    """One image for the renderer to draw.
+
+    Attributes:
+        prepared: A scene that `check_scene` accepts.
+        camera: Any camera outside the containers and above the ground.
+        view: Projection of the camera; its size is that of the image.
+        layer: "all", or one of LAYERS to see a single material layer unlit.
+        radiance: Return exposed linear radiance in `Frame.radiance`, and a black image.
+        normals: Return surface normals in `Frame.normals`.
+    """
+
+    prepared: PreparedScene
+    camera: Camera
+    view: View
+    layer: str = "all"
+    radiance: bool = False
+    normals: bool = False
 
 
 class DrawOptions(NamedTuple):

@@ -88,28 +88,13 @@ class ImageTargets:
         self._normals.bind_to_image(0, read=False, write=True)
 
     def read(self) -> Frame:
-        """Copy the image to the CPU. `Frame.image` is black where the colour is radiance."""
+        """Copy the image to the CPU, see `frame_of`."""
         width, height = self.size
         color = np.empty((height, width, 4), np.float32 if self.radiance else np.uint8)
         labels = np.empty((height, width), np.uint32)
         depth = np.empty((height, width), np.float32)
         self.copy_to(color, labels, depth)
-        pairs = labels.view(np.uint16).reshape(height, width, 2)
-        # NumPy takes 20 times as long as OpenCV to drop a channel
-        rgb, cover = cv2.cvtColor(color, cv2.COLOR_RGBA2RGB), cv2.extractChannel(color, 3)
-        if self.radiance:
-            image = np.zeros((height, width, 3), np.uint8)
-            cover = np.rint(255 * np.clip(cover, 0, 1))
-        else:
-            image = np.asarray(rgb, np.uint8)
-        return Frame(
-            image=image,
-            cover=np.asarray(cover, np.uint8),
-            ids=np.ascontiguousarray(pairs[..., 0]),
-            damage=np.ascontiguousarray(pairs[..., 1]),
-            depth=depth,
-            radiance=np.asarray(rgb, np.float32) if self.radiance else None,
-        )
+        return frame_of(color, labels, depth)
 
     def read_normals(self) -> NDArray[np.float32]:
         """Copy the sum of the normals in each pixel, float32 [H, W, 3], in the world frame."""
@@ -118,21 +103,60 @@ class ImageTargets:
         read = np.frombuffer(self._normals.read(), np.float32)
         return read.reshape(height, width, 4)[..., :3]
 
-    def copy_to(self, color: Any, labels: Any, depth: Any) -> None:
+    def copy_to(
+        self, color: Any, labels: Any, depth: Any, *, offsets: tuple[int, int, int] = (0, 0, 0)
+    ) -> None:
         """Copy the image into writable memory or, without leaving the GPU, moderngl buffers.
 
         Args:
             color: uint8 [H, W, 4], or float32 for radiance: colour and coverage.
             labels: uint32 [H, W], id | damage << 16.
             depth: float32 [H, W] in metres.
+            offsets: Position of each of the three in its memory or buffer, in bytes.
         """
-        kind = "f4" if self.radiance else "f1"
-        self.image.read_into(color, components=4, attachment=0, dtype=kind, alignment=1)
-        self.image.read_into(labels, components=1, attachment=1, dtype="u4", alignment=1)
-        self.image.read_into(depth, components=1, attachment=2, dtype="f4", alignment=1)
+        kinds = ("f4" if self.radiance else "f1", "u4", "f4")
+        for number, (place, kind) in enumerate(zip((color, labels, depth), kinds, strict=True)):
+            self.image.read_into(
+                place,
+                components=1 if number else 4,
+                attachment=number,
+                dtype=kind,
+                alignment=1,
+                write_offset=offsets[number],
+            )
 
     def release(self) -> None:
         """Free all GL objects."""
         items: list[Any] = [self._color, self.image, *self._image, self.lists]
         for item in [*items, *filter(None, [self._normals])]:
             item.release()
+
+
+def frame_of(color: NDArray[Any], labels: NDArray[np.uint32], depth: NDArray[np.float32]) -> Frame:
+    """Return the frame of an image as `ImageTargets.copy_to` gives it.
+
+    `Frame.image` is black where the colour is radiance.
+
+    Args:
+        color: uint8 [H, W, 4], or float32 for radiance. The frame keeps no reference to it.
+        labels: uint32 [H, W]. The frame keeps no reference to it.
+        depth: float32 [H, W], which becomes part of the frame.
+    """
+    height, width = labels.shape
+    pairs = labels.view(np.uint16).reshape(height, width, 2)
+    # NumPy takes 20 times as long as OpenCV to drop a channel
+    rgb, cover = cv2.cvtColor(color, cv2.COLOR_RGBA2RGB), cv2.extractChannel(color, 3)
+    radiance = color.dtype == np.float32
+    if radiance:
+        image = np.zeros((height, width, 3), np.uint8)
+        cover = np.rint(255 * np.clip(cover, 0, 1))
+    else:
+        image = np.asarray(rgb, np.uint8)
+    return Frame(
+        image=image,
+        cover=np.asarray(cover, np.uint8),
+        ids=np.ascontiguousarray(pairs[..., 0]),
+        damage=np.ascontiguousarray(pairs[..., 1]),
+        depth=depth,
+        radiance=np.asarray(rgb, np.float32) if radiance else None,
+    )

@@ -6,7 +6,7 @@ that see surfaces into classes, and shade each class. Colour, ids, damage and de
 draw. Labels are taken at the pixel centre and never filtered: a sample lies exactly on each centre.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from typing import Any, Self
 
@@ -21,9 +21,10 @@ from fastgen.frame import Frame
 from fastgen.geometry.damage_law import seen_damages, variant
 from fastgen.geometry.prepared_scene import Member, PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
+from fastgen.render.batch_readback import BatchReadback
 from fastgen.render.decal_tables import scale_for
 from fastgen.render.draw_blocks import DrawBlocks
-from fastgen.render.draw_inputs import DrawInputs, DrawOptions, regions_of
+from fastgen.render.draw_inputs import DrawInputs, DrawOptions, ImageRequest, regions_of
 from fastgen.render.gl import GLContext
 from fastgen.render.image_targets import ImageTargets
 from fastgen.render.material_textures import MaterialTextures
@@ -96,6 +97,7 @@ class Renderer:
         self._materials = MaterialTextures(gl, own)
         self._rays = RayLight(gl, programs, self._materials.resources, self.ambient)
         self._targets = RecentTargets(gl, quality)
+        self._batch = BatchReadback(self.ctx, collects=not gl.software)
         self._shapes = Shapes(self.ctx, self._geometry.programs)
         self._lights = SceneLights(gl, light, quality)
         self._blocks = DrawBlocks(self.ctx, damage.mask_threshold_mm)
@@ -119,9 +121,21 @@ class Renderer:
             radiance: Return exposed linear radiance in `Frame.radiance`, and a black image.
             normals: Return surface normals in `Frame.normals`.
         """
-        found = np.zeros((*size[::-1], 3), np.float32) if normals else None
-        frame = self._draw(prepared, view_of(camera, size), camera, layer, radiance, found).read()
-        return replace(frame, normals=found)
+        image = ImageRequest(prepared, camera, view_of(camera, size), layer, radiance, normals)
+        return self.render_batch([image])[0]
+
+    def render_batch(self, images: Sequence[ImageRequest]) -> list[Frame]:
+        """Draw images of one size one after the other, and copy them to the CPU.
+
+        Args:
+            images: As many as a group of `batch_readback.chunks` has at most.
+        """
+        found = [
+            np.zeros((*each.view.size[::-1], 3), np.float32) if each.normals else None
+            for each in images
+        ]
+        frames = self._batch.read(images, lambda k: self._draw(images[k], found[k]))
+        return [replace(frame, normals=found[k]) for k, frame in enumerate(frames)]
 
     def draw(self, prepared: PreparedScene, camera: Camera, size: tuple[int, int]) -> ImageTargets:
         """Draw a scene and leave the image on the GPU until the next draw.
@@ -133,29 +147,23 @@ class Renderer:
             camera: Any camera outside the container.
             size: (width, height) in pixels.
         """
-        return self._draw(prepared, view_of(camera, size), camera)
+        return self._draw(ImageRequest(prepared, camera, view_of(camera, size)))
 
     def _draw(
-        self,
-        prepared: PreparedScene,
-        view: View,
-        camera: Camera,
-        layer: str = "all",
-        radiance: bool = False,
-        normals: NDArray[np.float32] | None = None,
+        self, image: ImageRequest, normals: NDArray[np.float32] | None = None
     ) -> ImageTargets:
-        """Draw a scene, and fill `normals` [H, W, 3] if given.
+        """Draw an image, and fill `normals` [H, W, 3] if given.
 
         Containers do not overlap. Several are drawn over one another from back to front.
         """
-        scene = prepared.scene
+        prepared, view, scene = image.prepared, image.view, image.prepared.scene
         self._compile_for(prepared)
         self._materials.release_old(len(prepared.members))
         for each in prepared.members:  # their artwork may replace a texture, which inputs hold
             self._materials.resources(each.prepared)
-        exposure = self._lights.exposure(scene, camera, view).factor
+        exposure = self._lights.exposure(scene, image.camera, view).factor
         several = bool(scene.neighbours or scene.ground)
-        options = DrawOptions(layer, radiance, over=several)
+        options = DrawOptions(image.layer, image.radiance, over=several)
         around = self._lights.around(prepared, self._materials.resources) if several else None
         inputs = self._inputs(prepared, view, options, around)
         first = prepared.members[0]
@@ -384,8 +392,9 @@ class Renderer:
 
     def release(self) -> None:
         """Free every GL object of this renderer."""
-        owners: list[Any] = [self._targets, self._rays, self._shapes, self._lights, self._materials]
-        for item in [*owners, self._geometry, self._ground, self._programs, self._blocks]:
+        owners: list[Any] = [self._targets, self._batch, self._rays, self._shapes, self._lights]
+        owners += [self._materials, self._geometry, self._ground, self._programs, self._blocks]
+        for item in owners:
             item.release()
 
     def __enter__(self) -> Self:
