@@ -1,15 +1,18 @@
-"""Light on the ground between containers against Monte Carlo integrals."""
+"""Light on the ground between containers against Monte Carlo integrals, and its mean albedo."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from fastgen import Config
 from fastgen.light.environment import load_environment, sky_irradiance, to_map_frame
-from fastgen.light.ground_light import ground_light
+from fastgen.light.ground_light import ground_light, mean_albedo
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.octahedral import octahedral_encode
 from fastgen.light.surrounding_change import FACES
 from fastgen.light.surrounding_light import surrounding_light
-from fastgen.scene import REC_709, Pose
+from fastgen.scene import REC_709, Ground, Pose
 from fastgen.scene.boxes import container_box
 
 ALBEDO = 0.3
@@ -123,3 +126,25 @@ def test_faces_of_a_box_alone_have_the_whole_light(name, yaw_deg):
         toward = to_map_frame(sun.direction, -yaw_deg)
         expected += np.maximum(normals @ toward, 0.0)[:, None] * np.array(sun.light)
     np.testing.assert_allclose(found, ALBEDO * expected, rtol=1e-5)
+
+
+def linear(encoded):
+    """Return linear values of sRGB bytes."""
+    values = encoded / 255
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+@pytest.mark.parametrize("wetness", [0.15, 0.3, 0.6, 1.0])
+def test_mean_albedo_of_wet_ground_equals_its_baked_material(generators, wetness):
+    generator = generators(Config.preset("gate"), seed=3, size=(64, 64), quality="draft")
+    dry = Ground("concrete", -1200.0, (0.4, 0.4, 0.4), wear=0.0, lines=0.0, reach_mm=30000.0)
+    wet = replace(dry, wetness=wetness)
+    scene = generator.scene(0)
+    of_dry, of_wet = (
+        linear(generator.bake_ground(replace(scene, ground=each), texel_mm=30.0).base_color)
+        for each in (dry, wet)
+    )
+    expected = of_wet.mean(axis=(0, 1)) / of_dry.mean(axis=(0, 1))
+    assert expected.max() < 0.97
+    found = np.divide(mean_albedo(wet), mean_albedo(dry))
+    np.testing.assert_allclose(found, expected, rtol=0.02)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastgen.light.environment import Ambient, hidden_sky, sky_irradiance
+from fastgen.light.reflectance import POROUS_LOSS
 from fastgen.scene import Color, Ground
 from fastgen.scene.boxes import OrientedBox
 from fastgen.scene.limits import MM
@@ -35,6 +36,12 @@ _OUTSIDE_M = 2e-3
 
 LINE_MM = 130.0
 """Width of the lines painted on the ground."""
+
+DAMP_SOFTNESS = 0.3
+"""Half the range of noise over which wet ground turns from dry to damp."""
+
+DAMP_WETNESS = 0.65
+"""Wetness of damp ground as a surface, see shaders/wetness.glsl."""
 
 _SECTORS = 16
 """Azimuths in which the overlap of boxes is computed."""
@@ -72,11 +79,32 @@ class GroundLight:
 
 
 def mean_albedo(ground: Ground) -> Color:
-    """Return the albedo of a dry ground with its lines, as seen from afar."""
+    """Return the albedo of a ground with its lines and its damp areas, as seen from afar."""
     share = ground.lines * LINE_MM / ground.line_spacing_mm
+    left = 1 - POROUS_LOSS * DAMP_WETNESS * _damp_share(ground.wetness)
     pairs = zip(ground.albedo, ground.line_albedo, strict=True)
-    red, green, blue = (own + share * (line - own) for own, line in pairs)
+    red, green, blue = (left * (own + share * (line - own)) for own, line in pairs)
     return red, green, blue
+
+
+def damp_threshold(wetness: float) -> float:
+    """Return the value of uniform noise at which ground of a wetness is half damp."""
+    return 1.35 - 2.1 * wetness
+
+
+def _damp_share(wetness: float) -> float:
+    """Return the mean of covered() in shaders/noise.glsl over uniform noise, for damp ground.
+
+    Puddles add nothing, because they only cover ground that is damp already.
+    """
+
+    def integral(reach: float) -> float:
+        """Return the integral of the linear ramp up to a distance beyond the threshold."""
+        ramp = min(max(reach + DAMP_SOFTNESS, 0.0), 2 * DAMP_SOFTNESS)
+        return ramp**2 / (4 * DAMP_SOFTNESS) + max(reach - DAMP_SOFTNESS, 0.0)
+
+    threshold = damp_threshold(wetness)
+    return integral(1 - threshold) - integral(-threshold)
 
 
 def left_of_sky(whole: ArrayLike, left: ArrayLike, share: ArrayLike) -> NDArray[np.floating]:
