@@ -102,8 +102,8 @@ GroundMaterial ground_material(vec2 at_mm, GroundFootprint f) {
     float roughness = 0.9;
 #if GROUND_WET
     float puddle = covered(broad.value.x, puddle_threshold, broad.lost.x, 0.05);
-    float damp = max(covered(broad.value.x, damp_threshold, broad.lost.x, 0.3), puddle);
-    apply_wetness(albedo, roughness, 0.0, 0.65 * damp);
+    float damp = max(covered(broad.value.x, damp_threshold, broad.lost.x, DAMP_SOFTNESS), puddle);
+    apply_wetness(albedo, roughness, 0.0, DAMP_WETNESS * damp);
     roughness = mix(roughness, 0.06, puddle);
 #endif
     return GroundMaterial(albedo, roughness);

@@ -73,7 +73,7 @@ vec3 prop_color(PropHit hit, vec3 at) {
     vec3 lit = ambient.rgb + ground_lights(beside, vec3(0.0, 0.0, 1.0), hidden, PROP_SUNLIT_BESIDE_M);
     float up = 0.5 + 0.5 * n.z, raised = clamp((at.z - ground_height_m) / PROP_OPEN_M, 0.0, 1.0);
     vec3 light = up * ambient.a * diffuse_radiance(n + vec3(0.0, 0.0, 0.5)) +
-                 (1.0 - up) * ground_albedo * lit;
+                 (1.0 - up) * ground_mean_albedo * lit;
     light *= mix(PROP_LOWEST_SHARE, 1.0, raised);
     vec3 outside = fma(vec3(PROP_OFFSET_M), n, at);
     light += ground_lights(outside, n, hidden_by_boxes(outside, PROP_OFFSET_M), PROP_OFFSET_M);

@@ -264,7 +264,7 @@ def test_form_factors_equal_those_of_a_parallel_disc():
 def test_sky_share_equals_a_monte_carlo_integral(ambient, poses, height_mm, tolerance):
     rng = np.random.default_rng(2)
     boxes = [container_box("20", pose) for pose in poses]
-    light = ground_light(boxes, np.full((len(boxes), 3), 0.2), ambient, YAW_DEG, height_mm)
+    light = ground_light(boxes, np.full((len(boxes), 4, 3), 0.2), ambient, YAW_DEG, height_mm)
     count = 6000
     u, v = rng.random((2, count))
     rays = np.column_stack(
@@ -294,7 +294,7 @@ def test_what_boxes_hide_of_a_sky_has_its_color_there(name):
     """Beside a container the mean color of the rest of the sky is not that of the whole sky."""
     ambient = Ambient.of(load_environment(bundled_hdris()[name]))
     box = container_box("40", Pose())
-    light = ground_light([box], [(0.0, 0.0, 0.0)], ambient, YAW_DEG, 0.0)
+    light = ground_light([box], np.zeros((1, 4, 3)), ambient, YAW_DEG, 0.0)
     (whole,) = sky_irradiance(ambient, [[0.0, 0.0, 1.0]], YAW_DEG)
     rng = np.random.default_rng(3)
     rays = rng.normal(size=(40_000, 3))
@@ -318,11 +318,11 @@ def test_what_boxes_hide_of_a_sky_has_its_color_there(name):
 
 def test_light_on_open_ground_is_that_of_the_sky_and_paint_colors_its_foot(ambient):
     sky = sky_irradiance(ambient, [[0.0, 0.0, 1.0]], YAW_DEG)[0]
-    alone = ground_light([], np.zeros((0, 3)), ambient, YAW_DEG, 0.0)
+    alone = ground_light([], [], ambient, YAW_DEG, 0.0)
     np.testing.assert_allclose(alone.texels[..., :3], np.broadcast_to(sky, (32, 64, 3)), rtol=1e-3)
     box = [container_box("40", Pose())]
     red, black = (
-        ground_light(box, [color], ambient, YAW_DEG, 0.0).texels
+        ground_light(box, np.tile(color, (1, 4, 1)), ambient, YAW_DEG, 0.0).texels
         for color in ((0.6, 0.0, 0.0), (0.0, 0.0, 0.0))
     )
     added = red - black

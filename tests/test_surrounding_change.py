@@ -32,6 +32,7 @@ def test_encoded_light_of_surroundings_is_the_light_itself(color, added):
         lower=np.zeros((6, 3), np.float32),
         open_bits=np.full((points, bits.shape[1]), 0xF0, np.uint8),
         ground=None,
+        faces=np.zeros((6, 3), np.float32),
     )
     found = around.applied(visibility, sky, values, light, mesh)
     expected = around.vertex_light(values, light, mesh)

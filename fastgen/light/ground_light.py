@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastgen.light.environment import Ambient, hidden_sky, sky_irradiance, to_map_frame
+from fastgen.light.environment import Ambient, hidden_sky, sky_irradiance
+from fastgen.light.reflectance import POROUS_LOSS
 from fastgen.scene import Color, Ground
 from fastgen.scene.boxes import OrientedBox
 from fastgen.scene.limits import MM
@@ -35,6 +36,12 @@ _OUTSIDE_M = 2e-3
 
 LINE_MM = 130.0
 """Width of the lines painted on the ground."""
+
+DAMP_SOFTNESS = 0.3
+"""Half the range of noise over which wet ground turns from dry to damp."""
+
+DAMP_WETNESS = 0.65
+"""Wetness of damp ground as a surface, see shaders/wetness.glsl."""
 
 _SECTORS = 16
 """Azimuths in which the overlap of boxes is computed."""
@@ -72,11 +79,32 @@ class GroundLight:
 
 
 def mean_albedo(ground: Ground) -> Color:
-    """Return the albedo of a dry ground with its lines, as seen from afar."""
+    """Return the albedo of a ground with its lines and its damp areas, as seen from afar."""
     share = ground.lines * LINE_MM / ground.line_spacing_mm
+    left = 1 - POROUS_LOSS * DAMP_WETNESS * _damp_share(ground.wetness)
     pairs = zip(ground.albedo, ground.line_albedo, strict=True)
-    red, green, blue = (own + share * (line - own) for own, line in pairs)
+    red, green, blue = (left * (own + share * (line - own)) for own, line in pairs)
     return red, green, blue
+
+
+def damp_threshold(wetness: float) -> float:
+    """Return the value of uniform noise at which ground of a wetness is half damp."""
+    return 1.35 - 2.1 * wetness
+
+
+def _damp_share(wetness: float) -> float:
+    """Return the mean of covered() in shaders/noise.glsl over uniform noise, for damp ground.
+
+    Puddles add nothing, because they only cover ground that is damp already.
+    """
+
+    def integral(reach: float) -> float:
+        """Return the integral of the linear ramp up to a distance beyond the threshold."""
+        ramp = min(max(reach + DAMP_SOFTNESS, 0.0), 2 * DAMP_SOFTNESS)
+        return ramp**2 / (4 * DAMP_SOFTNESS) + max(reach - DAMP_SOFTNESS, 0.0)
+
+    threshold = damp_threshold(wetness)
+    return integral(1 - threshold) - integral(-threshold)
 
 
 def left_of_sky(whole: ArrayLike, left: ArrayLike, share: ArrayLike) -> NDArray[np.floating]:
@@ -125,7 +153,7 @@ def form_factors(corners: NDArray[np.floating]) -> NDArray[np.floating]:
 
 def ground_light(
     boxes: Sequence[OrientedBox],
-    albedos: ArrayLike,
+    face_radiance: ArrayLike,
     ambient: Ambient,
     yaw_deg: float,
     height_mm: float,
@@ -134,7 +162,7 @@ def ground_light(
 
     Args:
         boxes: Outer boxes of the containers.
-        albedos: Mean linear color [B, 3] of each.
+        face_radiance: Radiance [B, 4, 3] of the -x, +x, -y and +y face of each box.
         ambient: Light of the environment.
         yaw_deg: Rotation of the environment.
         height_mm: Height of the ground.
@@ -158,16 +186,7 @@ def ground_light(
     for _ in range(2 if len(placed) > 1 else 1):  # the nearest edge may lie in another box
         for box in placed:
             points = box.moved_out(points)
-    radiance = (
-        np.array(
-            [
-                _face_radiance(box, albedo, ambient, yaw_deg)
-                for box, albedo in zip(boxes, np.asarray(albedos), strict=True)
-            ]
-        )
-        .reshape(-1, 4, 3)
-        .astype(np.float32)
-    )
+    radiance = np.asarray(face_radiance, np.float32).reshape(-1, 4, 3)
     hidden, bounced = _occlusion(placed, points, radiance)
     share = np.maximum(1.0 - hidden[:, 2].sum(axis=0), 0.0)
     (whole,) = sky_irradiance(ambient, [[0.0, 0.0, 1.0]], yaw_deg)
@@ -176,9 +195,7 @@ def ground_light(
         some = np.flatnonzero(each[2])
         sky[:, some] -= each[2, some] * hidden_sky(ambient, each[:, some].T, yaw_deg).T
     sky = left_of_sky(whole[:, None], sky, share)
-    # walls of narrow gaps are in the shade themselves
-    light = sky + bounced * np.minimum(2 * share, 1.0)
-    texels = np.concatenate([light, share[None]]).T.reshape(*GRID[::-1], 4)
+    texels = np.concatenate([sky + bounced, share[None]]).T.reshape(*GRID[::-1], 4)
     return GroundLight(np.ascontiguousarray(texels, np.float32), low, step, radiance)
 
 
@@ -329,15 +346,3 @@ def _doubled(values: NDArray[np.floating], axis: int) -> NDArray[np.floating]:
     shape = [*values.shape]
     shape[axis] *= 2
     return np.stack([values, (values + following) / 2], axis=axis + 1).reshape(shape)
-
-
-def _face_radiance(
-    box: OrientedBox, albedo: NDArray[np.float64], ambient: Ambient, yaw_deg: float
-) -> Array:
-    """Return the radiance [4, 3] of the four sides of a box that stands alone."""
-    normals = np.stack([-box.axes[0], box.axes[0], -box.axes[1], box.axes[1]])
-    light = sky_irradiance(ambient, normals, yaw_deg).astype(np.float64)
-    turned = to_map_frame(normals, yaw_deg)
-    for each in ambient.lights:
-        light += np.maximum(turned @ np.array(each.direction), 0.0)[:, None] * each.light
-    return light * albedo

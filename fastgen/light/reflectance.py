@@ -15,6 +15,9 @@ DIELECTRIC_INDEX = 1.5
 DIELECTRIC_F0 = ((DIELECTRIC_INDEX - 1) / (DIELECTRIC_INDEX + 1)) ** 2
 """Reflectance of a dielectric at normal incidence, by Fresnel's equations."""
 
+POROUS_LOSS = 0.8
+"""Share of its albedo that a rough non-metal loses when it is soaked, see shaders/wetness.glsl."""
+
 _POINTS = 4096
 
 

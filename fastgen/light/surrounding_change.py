@@ -38,6 +38,7 @@ class SurroundingLight:
             container hides, packed by np.packbits.
         ground: float32 [6, 3], mean radiance of the ground in a level mirror on each of these
             sides; None without ground.
+        faces: float32 [6, 3], radiance of these sides of the container's outer box.
     """
 
     sky: NDArray[np.float32]
@@ -45,6 +46,7 @@ class SurroundingLight:
     lower: NDArray[np.float32]
     open_bits: NDArray[np.uint8]
     ground: NDArray[np.float32] | None
+    faces: NDArray[np.float32]
 
     def applied(
         self,

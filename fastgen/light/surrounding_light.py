@@ -63,7 +63,7 @@ def surrounding_light(
         paving: The ground, None without one.
     """
     faces = [_Faces.of(box) for box in boxes]
-    radiance = _face_radiance(faces, boxes, np.array(albedos), light, yaw_deg)
+    radiance = _face_radiance(faces, boxes, np.reshape(albedos, (-1, 3)), light, yaw_deg)
     found, sky = [], Sky(light, yaw_deg)
     for i, box in enumerate(boxes):
         low, high = (np.asarray(bound, np.float64) for bound in bounds[i])
@@ -96,7 +96,10 @@ def surrounding_light(
             left, added = above / upper, ground + bounced
             seen = _mean_by_side(mirrored, normals)
         bits = _open_bits(points, box, [boxes[j] for j in others])
-        found.append(SurroundingLight(_narrow(left), _narrow(added), _narrow(below), bits, seen))
+        own = _narrow(radiance[i])
+        found.append(
+            SurroundingLight(_narrow(left), _narrow(added), _narrow(below), bits, seen, own)
+        )
     return found
 
 
@@ -157,20 +160,26 @@ def _face_radiance(
     light: Ambient,
     yaw_deg: float,
 ) -> Array:
-    """Return the radiance [B, 6, 3] in the middle of each face of boxes with albedos [B, 3].
+    """Return the radiance [B, 6, 3] of each face of boxes with albedos [B, 3].
 
-    It includes one bounce from the other boxes.
+    It is the mean of two points of a face, and includes one bounce from the other boxes.
     """
     count = len(boxes)
     received, between = np.zeros((count, 6, 3)), np.zeros((count, 6, count, 6))
     for number, own in enumerate(faces):
-        start = own.middles + LIFT_MM * own.normals
+        pairs = (own.corners[:, ::2] + own.middles[:, None]) / 2 + LIFT_MM * own.normals[:, None]
+        points, normals = pairs.reshape(-1, 3), own.normals.repeat(2, axis=0)
         others = [j for j in range(count) if j != number]
-        covered = _covered(start, own.normals, [faces[j] for j in others])
-        between[number][:, others] = covered.transpose(2, 0, 1)
-        left = 1 - covered.sum(axis=(0, 1))[:, None]
-        received[number] = sky_irradiance(light, own.normals, yaw_deg) * left
-        received[number] += directional_light(start, own.normals, boxes, light, yaw_deg)
+        covered = _covered(points, normals, [faces[j] for j in others])
+        # boxes behind one another hide less than the sum of their form factors
+        met = _met(points, sky_directions(), [boxes[j] for j in others])
+        facing = np.maximum(normals @ sky_directions().T, 0.0)
+        hidden = (facing * met).sum(axis=1) / facing.sum(axis=1)
+        covered *= np.minimum(hidden / np.maximum(covered.sum(axis=(0, 1)), 1e-9), 1.0)
+        lit = sky_irradiance(light, normals, yaw_deg) * (1 - covered.sum(axis=(0, 1))[:, None])
+        lit += directional_light(points, normals, boxes, light, yaw_deg)
+        received[number] = lit.reshape(6, 2, 3).mean(axis=1)
+        between[number][:, others] = covered.reshape(-1, 6, 6, 2).mean(axis=3).transpose(2, 0, 1)
     paint = albedos[:, None]
     bounced = np.tensordot(between, received * paint, axes=2)
     found: Array = (received + bounced) * paint

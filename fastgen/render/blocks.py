@@ -124,6 +124,8 @@ GROUND_BLOCK = Block(
         ("float", "ground_height_m"),
         ("vec3", "line_albedo"),
         ("float", "ground_reach_m"),
+        ("vec3", "ground_mean_albedo"),  # with lines and damp areas
+        ("float", "slab_mm"),
         ("vec2", "line_direction"),
         ("vec2", "ground_noise_mm"),
         ("float", "line_spacing_mm"),
@@ -133,7 +135,6 @@ GROUND_BLOCK = Block(
         ("float", "stain_threshold"),
         ("float", "damp_threshold"),
         ("float", "puddle_threshold"),
-        ("float", "slab_mm"),
         ("float", "ground_clear_m"),
         ("int", "box_count"),  # containers
     ),

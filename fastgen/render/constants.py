@@ -17,8 +17,8 @@ from fastgen.decals.artwork import ART_SIZE
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
 from fastgen.light import environment, prop_light
-from fastgen.light.ground_light import LINE_MM
-from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX
+from fastgen.light.ground_light import DAMP_SOFTNESS, DAMP_WETNESS, LINE_MM
+from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX, POROUS_LOSS
 from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
 from fastgen.render import glyph_runs, rust
 from fastgen.render.blocks import MAX_BOXES
@@ -200,6 +200,8 @@ def _ground(v: ShaderVariant) -> Defines:
         "GROUND_COARSE": int(ground.coarse),
         "GROUND_FADE_START": GROUND_FADE_START,
         "LINE_MM": LINE_MM,
+        "DAMP_SOFTNESS": DAMP_SOFTNESS,
+        "DAMP_WETNESS": DAMP_WETNESS,
         "MAX_BOXES": MAX_BOXES,
         "PROP_AMBIENT_BESIDE_M": prop_light.AMBIENT_BESIDE_M,
         "PROP_SUNLIT_BESIDE_M": prop_light.SUNLIT_BESIDE_M,
@@ -299,6 +301,7 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "MIN_ROUGHNESS": MIN_ROUGHNESS,
         "DIELECTRIC_F0": DIELECTRIC_F0,
         "DIELECTRIC_INDEX": DIELECTRIC_INDEX,
+        "POROUS_LOSS": POROUS_LOSS,
     },
     "sky_visibility": lambda _: {
         "LIGHT_STEPS": f"{LIGHT_STEPS:.1f}",

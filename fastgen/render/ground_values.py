@@ -8,7 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.geometry.container_layout import BESIDE_MM, RING_BOTTOM_MM, Layout
 from fastgen.geometry.prepared_scene import Member
-from fastgen.light.ground_light import GRID, LOW_GAP_M, GroundLight
+from fastgen.light.ground_light import (
+    GRID,
+    LOW_GAP_M,
+    GroundLight,
+    damp_threshold,
+    mean_albedo,
+)
 from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.constants import GROUND_FADE_START
 from fastgen.scene import Ground, Prop
@@ -74,6 +80,7 @@ def ground_values(
         "ground_height_m": ground.height_mm * MM,
         "line_albedo": ground.line_albedo,
         "ground_reach_m": ground.reach_mm * MM,
+        "ground_mean_albedo": mean_albedo(ground),
         "line_direction": (np.cos(yaw), np.sin(yaw)),
         "ground_noise_mm": ground.noise_offset_mm,
         "line_spacing_mm": ground.line_spacing_mm,
@@ -81,7 +88,7 @@ def ground_values(
         # thresholds just outside of 0..1 leave nothing or everything however blurred
         "line_threshold": 1.3 - 1.6 * ground.lines if ground.lines else 9.0,
         "stain_threshold": _normal_threshold(_STAINED * ground.wear),
-        "damp_threshold": 1.35 - 2.1 * wet if wet else 9.0,
+        "damp_threshold": damp_threshold(wet) if wet else 9.0,
         "puddle_threshold": 1.1 - 0.65 * wet**1.5 if wet else 9.0,
         "slab_mm": 4000 + np.mod(abs(ground.noise_offset_mm[0]), 2000.0),
         "box_count": len(members),

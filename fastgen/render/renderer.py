@@ -91,7 +91,7 @@ class Renderer:
         self._kinds = program_kinds(damage.kinds)
         self._geometry = GeometryPass(self.ctx, programs, self._kinds)
         self._background = BackgroundPass(self.ctx, programs, by_compute=not gl.software)
-        self._ground = GroundPass(self.ctx, programs, self.ambient)
+        self._ground = GroundPass(self.ctx, programs, self.ambient, self._around)
         self._shading = ShadingPass(self.ctx, programs)
         self._normals = NormalsPass(self.ctx, programs)
         self._materials = MaterialTextures(gl, own)
@@ -164,7 +164,7 @@ class Renderer:
         exposure = self._lights.exposure(scene, image.camera, view).factor
         several = bool(scene.neighbours or scene.ground)
         options = DrawOptions(image.layer, image.radiance, over=several)
-        around = self._lights.around(prepared, self._materials.resources) if several else None
+        around = self._around(prepared) if several else None
         inputs = self._inputs(prepared, view, options, around)
         first = prepared.members[0]
         self._light(inputs, first, prepared, exposure)
@@ -188,6 +188,10 @@ class Renderer:
                 self._trace(inputs, member, prepared, around)
                 self._shade(inputs, member, exposure, normals)
         return inputs.targets
+
+    def _around(self, prepared: PreparedScene) -> Around:
+        """Return what surroundings change in the light on each container that a scene shows."""
+        return self._lights.around(prepared, self._materials.resources)
 
     def _compile_for(self, prepared: PreparedScene) -> None:
         """Compile programs for kinds of damage that the current programs cannot draw."""
@@ -241,7 +245,7 @@ class Renderer:
         environment = scene.environment
         light, ambient = self._lights.of(environment.name), self.ambient(environment)
         resources = self._materials.resources(prepared)
-        near = None if around is None else around[prepared]
+        near = None if around is None else around.get(prepared)
         container, spreader, below = self._shapes.of(
             prepared, resources.materials, lens, ambient, near
         )

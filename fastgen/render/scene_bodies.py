@@ -155,7 +155,7 @@ def _of_prop(
     level = np.broadcast_to((0.0, 0.0, 1.0), beside.shape)
     from_ground = around[:, :3] + directional_light(beside, level, boxes, ambient, yaw_deg)
     from_sky = around[:, 3:] * sky_irradiance(ambient, normals + (0.0, 0.0, 0.5), yaw_deg)
-    found = up * from_sky + (1 - up) * np.array(ground.albedo) * from_ground
+    found = up * from_sky + (1 - up) * np.array(mean_albedo(ground)) * from_ground
     raised = np.clip((place[:, 2:] - ground.height_mm) * MM / prop_light.OPEN_M, 0.0, 1.0)
     lowest = prop_light.LOWEST_SHARE
     paint = np.array(prop.albedo, np.float32) + np.float32(prop_light.SHEEN)

@@ -22,7 +22,7 @@ from fastgen.render.shadows import Shadows
 from fastgen.scene import Camera, EnvironmentView, Scene
 
 Around = Mapping[PreparedScene, SurroundingLight]
-"""Change of the light on each container of a scene."""
+"""Change of the light on each container that a scene shows."""
 
 
 class SceneLights:
@@ -86,7 +86,7 @@ class SceneLights:
         """
 
         def found() -> Around:
-            scene, members, ground = prepared.scene, prepared.members, prepared.scene.ground
+            scene, members, ground = prepared.scene, prepared.present, prepared.scene.ground
             changes = surrounding_light(
                 [each.box for each in members],
                 [resources(each.prepared).materials.sheet for each in members],

@@ -20,6 +20,7 @@ from fastgen.render.ground_values import ground_values
 from fastgen.render.passes.bake import Atlas, bake_ground
 from fastgen.render.program import Programs, Textures
 from fastgen.render.recent_cache import ReleasingCache
+from fastgen.render.scene_lights import Around
 from fastgen.render.textures import data_texture
 from fastgen.render.tiles import Mask
 from fastgen.render.variant import GroundVariant, ShaderVariant
@@ -41,6 +42,7 @@ class GroundPass:
         ctx: moderngl.Context,
         programs: Programs,
         ambient: Callable[[EnvironmentView], Ambient],
+        around: Callable[[PreparedScene], Around],
     ) -> None:
         """Prepare the pass.
 
@@ -48,10 +50,12 @@ class GroundPass:
             ctx: Current context.
             programs: Programs of the renderer.
             ambient: Returns the light of an environment, such as `Renderer.ambient`.
+            around: Returns what surroundings change in the light on each container of a scene.
         """
         self._ctx = ctx
         self._programs = programs
         self._ambient = ambient
+        self._around = around
         self._block = ctx.buffer(reserve=GROUND_BLOCK.size)
         self._scenes: ReleasingCache[_SceneLight] = ReleasingCache(2)
         self._coarse: ReleasingCache[_CoarseTarget] = ReleasingCache(2)
@@ -117,13 +121,14 @@ class GroundPass:
         scene, present = prepared.scene, prepared.present
         ground = scene.ground
         assert ground is not None
+        around = self._around(prepared)
         return self._scenes.get(
             prepared,
             lambda: _SceneLight(
                 self._ctx,
                 ground_light(
                     [member.box for member in present],
-                    [member.prepared.scene.surface.paint.albedo for member in present],
+                    [around[member.prepared].faces[:4] for member in present],
                     self._ambient(scene.environment),
                     scene.environment.yaw_deg,
                     ground.height_mm,
