@@ -8,6 +8,7 @@ import pytest
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.light.directional_lights import DirectionalLight
 from fastgen.render.constants import TILE_PX
 from fastgen.render.ground_plan import ground_plan
 from fastgen.render.tiles import Tiles, bit_masks
@@ -140,8 +141,8 @@ def test_what_is_drawn_is_disjoint_and_leaves_out_only_what_is_hidden(
     ground = replace(GROUND, wetness=wetness)
     prepared = PreparedScene(replace(scene, ground=ground))
     view = view_of(camera, SIZE)
-    toward = np.array([0.4, 0.3, 0.866])
-    plan = ground_plan(ground, PROPS, prepared.present, view, toward)
+    lights = [DirectionalLight((0.4, 0.3, 0.866), (1.0, 1.0, 1.0), 0.005)]
+    plan = ground_plan(ground, PROPS, prepared.present, view, lights)
     count = sum(each.tiles.astype(int) for each in plan.plane)
     assert count.max() == 1
     drawn = generator.render(scene=prepared.scene, camera=camera)
@@ -166,11 +167,11 @@ def test_a_container_with_a_hole_hides_nothing(generator, scene):
         for found in map(generator.scene, range(200))
         if any(damage.kind == "perforation" for damage in found.damages)
     )
-    view, up = view_of(CAMERAS[0], SIZE), np.array([0.0, 0.0, 1.0])
+    view, up = view_of(CAMERAS[0], SIZE), DirectionalLight((0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 0.005)
     hidden = []
     for damages in ((), torn):
         given = PreparedScene(replace(scene, damages=damages, neighbours=(), props=()))
-        plan = ground_plan(GROUND, (), given.present, view, up)
+        plan = ground_plan(GROUND, (), given.present, view, [up])
         hidden.append((~plan.sky & (sum(each.tiles for each in plan.plane) == 0)).sum())
     assert hidden[0] > 0
     assert hidden[1] == 0
@@ -178,13 +179,13 @@ def test_a_container_with_a_hole_hides_nothing(generator, scene):
 
 def test_scenes_with_other_numbers_of_containers_share_the_programs_of_the_ground(scene):
     """A program takes up to 0.7 s to compile, so few variants exist."""
-    view, up = view_of(CAMERAS[0], SIZE), np.array([0.0, 0.0, 1.0])
+    view, up = view_of(CAMERAS[0], SIZE), DirectionalLight((0.0, 0.0, 1.0), (1.0, 1.0, 1.0), 0.005)
     programs = set()
     for count in range(1, 6):
         others = tuple(
             replace(scene.neighbours[0], pose=Pose((0.0, 4000.0 * k, 0.0))) for k in range(1, count)
         )
         given = PreparedScene(replace(scene, neighbours=others))
-        plan = ground_plan(GROUND, PROPS, given.present, view, up)
+        plan = ground_plan(GROUND, PROPS, given.present, view, [up])
         programs |= {each.variant for each in (*plan.plane, plan.props)}
     assert len(programs) <= 3

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import inward_mm
-from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.geometry.prepared_scene import Member
+from fastgen.light.directional_lights import DirectionalLight
 from fastgen.render.ground_values import clear_radius_mm
 from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
@@ -22,10 +22,9 @@ from fastgen.scene.limits import MM, NEAR_M
 _SHADED_MM = 600.0
 """Distance from a prop within which it shades the ground, see ground_props.glsl."""
 
-_BLURRED_MM = 150.0
-"""Distance beyond a container's shadow to which its edge may be blurred."""
-
-_LONGEST_SHADOW_MM = 60000.0
+_FILTER_PX = 0.7
+"""Radius in pixels over which ground.frag filters edges of shadows on a plane seen face-on: 0.35
+pixels of an image that may have half the resolution."""
 
 _SKIN_MM = 150.0
 """Depth below its outer box from which an undamaged container hides what is behind it."""
@@ -74,7 +73,7 @@ def ground_plan(
     props: Sequence[Prop],
     members: Sequence[Member],
     view: View,
-    toward: Array,
+    lights: Sequence[DirectionalLight],
 ) -> GroundPlan:
     """Return what is drawn of the background, the plane and the props of a scene.
 
@@ -85,7 +84,8 @@ def ground_plan(
         props: Props on it.
         members: Containers that are present.
         view: Projection of the image.
-        toward: Unit vector [3] to the first directional light.
+        lights: Directional lights in the world frame, brightest first. Each casts the shadows of
+            containers, and the first also those of props.
     """
     tiles = Tiles(view)
     seen, near = _plane_tiles(tiles, ground, clear_radius_mm(ground, members, props))
@@ -97,7 +97,7 @@ def ground_plan(
     if props:
         parts = [prop_box(prop) for prop in props]
         seen_props = tiles.touched(np.stack([part.corners_mm for part in parts]))
-        shades = tiles.touched(_reaches(parts, ground.height_mm, toward, _SHADED_MM))
+        shades = tiles.touched(_reaches(parts, ground, view, lights[:1], _SHADED_MM)[0])
         shown, shaded = _any(seen_props), _any(shades)
         masks = np.concatenate([bit_masks(seen_props), bit_masks(shades)], axis=-1)
     wet = ground.wetness > 0
@@ -105,7 +105,7 @@ def ground_plan(
         dark = ~_none(tiles)
     elif members:
         boxes = [member.box for member in members]
-        dark = _any(tiles.touched(_reaches(boxes, ground.height_mm, toward, _BLURRED_MM)))
+        dark = _any(tiles.touched(np.concatenate(_reaches(boxes, ground, view, lights))))
     plain = GroundVariant(ground.kind, lens=view.distortion is not None, wet=wet)
     near_bodies = replace(plain, boxes=bool(members), shadows=bool(props))
     alone = seen & ~(hidden | dark | shaded)
@@ -163,33 +163,76 @@ def _solid_mm(member: Member, eye_mm: Array) -> Array | None:
 
 
 def _reaches(
-    boxes: Sequence[OrientedBox], ground_mm: float, toward: Array, margin_mm: float
+    boxes: Sequence[OrientedBox],
+    ground: Ground,
+    view: View,
+    lights: Sequence[DirectionalLight],
+    margin_mm: float = 0.0,
 ) -> Array:
-    """Return points [N, 16, 3]; each row's hull contains a box, its margin and its shadow, in mm.
+    """Return points [max(K, 1), N, P, 3] for each of K lights above the plane and each box, in mm.
+
+    Their hull contains the part of the plane below the box, the margin around this part, and the
+    shadow of the box with its penumbra.
 
     Args:
-        boxes: Boxes above the ground.
-        ground_mm: Height of the ground.
-        toward: Unit vector [3] to the light.
+        boxes: Boxes above the plane, N.
+        ground: The plane.
+        view: Projection of the image.
+        lights: Directional lights in the world frame.
         margin_mm: Horizontal margin around each box.
     """
     corners = np.stack([box.corners_mm for box in boxes])
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    low[:, :2], high[:, :2] = low[:, :2] - margin_mm, high[:, :2] + margin_mm
-    low[:, 2] = np.minimum(low[:, 2], ground_mm)
-    above = np.maximum(corners[..., 2:] - ground_mm, 0)
-    thrown = -toward[:2] * above / max(toward[2], 1e-3)
-    far = np.linalg.norm(thrown, axis=-1, keepdims=True)
-    thrown *= np.minimum(1, _LONGEST_SHADOW_MM / np.maximum(far, 1)) * 1.02
-    shadows = np.concatenate(
-        [corners[..., :2] + thrown, np.full_like(corners[..., :1], ground_mm)], axis=-1
-    )
+    at, above_mm = corners[..., :2], np.maximum(corners[..., 2] - ground.height_mm, 0)
+    margin = np.full(above_mm.shape, margin_mm)
+    below = _rectangles(at, np.array([1.0, 0.0]), margin, margin)
+    found = [
+        np.concatenate([below, _shadows(at, above_mm, each, ground, view)], axis=1)
+        for each in lights
+        if each.direction[2] > 0
+    ]
+    return np.insert(np.stack(found or [below]), 2, ground.height_mm, axis=-1)
+
+
+def _shadows(
+    at: Array, above_mm: Array, light: DirectionalLight, ground: Ground, view: View
+) -> Array:
+    """Return points [N, 4 P, 2] around the shadows of N bodies, including penumbra and filter.
+
+    Args:
+        at: Corners [N, P, 2] of each body in mm, seen from above.
+        above_mm: Their heights [N, P] above the plane.
+        light: A light above the plane, in the world frame.
+        ground: The plane. Shadows may end outside of its reach.
+        view: Projection of the image, over whose pixels edges of shadows are filtered.
+    """
+    level, sine = np.array(light.direction[:2]), light.direction[2]
+    cosine = max(float(np.linalg.norm(level)), 1e-6)
+    away = -level / cosine
+    longest = ground.reach_mm + np.linalg.norm(at, axis=-1).max()
+    length = np.minimum(above_mm * cosine / sine, longest)
+    ends = at + length[..., None] * away
+    eye = view.position_m / MM - (0, 0, ground.height_mm)
+    height = max(eye[2], 1.0)
+    distance = np.hypot(np.linalg.norm(ends - eye[:2], axis=-1), height)
+    filtered = _FILTER_PX / view.focals_px[0] * distance * np.sqrt(distance / height)
+    # a disc around the ray to the light, from the corner to the plane
+    across = light.radius * length / cosine + filtered
+    # rays that touch the disc at its far side meet the plane at a flatter angle than its axis
+    along = np.minimum(across / max(sine - light.radius * cosine, 1e-6), longest)
+    return _rectangles(ends, away, along, across)
+
+
+def _rectangles(center: Array, direction: Array, along: Array, across: Array) -> Array:
+    """Return the corners [N, 4 P, 2] of rectangles.
+
+    Args:
+        center: Their centres [N, P, 2].
+        direction: Unit vector [2].
+        along: Half of their lengths [N, P] in this direction.
+        across: Half of their widths [N, P].
+    """
+    aside = np.array([-direction[1], direction[0]])
+    ahead, beside = along[..., None] * direction, across[..., None] * aside
     return np.concatenate(
-        [_cuboids(low, high), _cuboids(shadows.min(axis=1), shadows.max(axis=1))], axis=1
+        [center + i * ahead + k * beside for i in (-1, 1) for k in (-1, 1)], axis=1
     )
-
-
-def _cuboids(low: Array, high: Array) -> Array:
-    """Return the corners [N, 8, 3] of upright boxes from their lowest and highest points [N, 3]."""
-    corners: Array = low[:, None] + UNIT_CUBE * (high - low)[:, None]
-    return corners

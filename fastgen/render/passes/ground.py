@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.light.directional_lights import DirectionalLight
 from fastgen.light.environment import Ambient, to_map_frame
 from fastgen.light.ground_light import GroundLight, ground_light
 from fastgen.render.blocks import GROUND_BLOCK
@@ -70,8 +71,8 @@ class GroundPass:
         scene = prepared.scene
         if scene.ground is None:
             return None
-        toward = _first_light(scene, self._ambient(scene.environment))
-        return ground_plan(scene.ground, scene.props, prepared.present, view, toward)
+        lights = _world_lights(scene, self._ambient(scene.environment))
+        return ground_plan(scene.ground, scene.props, prepared.present, view, lights)
 
     def run(self, inputs: DrawInputs, prepared: PreparedScene, plan: GroundPlan) -> None:
         """Draw the ground of a scene that has one.
@@ -87,22 +88,23 @@ class GroundPass:
         self._ctx.scissor = None
         width, height = inputs.targets.size
         half = (width + 1) // 2, (height + 1) // 2
-        coarse = self._coarse.get(half, lambda: _CoarseTarget(self._ctx, *half))
-        textures = {
-            **inputs.textures,
-            "ground_grid": light.texture,
-            "ground_coarse": coarse.texture,
-        }
+        textures = {**inputs.textures, "ground_grid": light.texture}
+        coarse = None
+        if inputs.coarse_ground:
+            coarse = self._coarse.get(half, lambda: _CoarseTarget(self._ctx, *half))
+            textures["ground_coarse"] = coarse.texture
         masks = None if plan.masks is None else data_texture(self._ctx, plan.masks)
         if masks is not None:
             textures["prop_tiles"] = masks
         steps = _steps(plan, inputs)
         with DrawnTiles(self._ctx, plan.tiles, [step.tiles for step in steps]) as drawn:
             for number, step in enumerate(steps):
-                shrunk = step.variant.ground.coarse
-                (coarse.framebuffer if shrunk else inputs.targets.image).use()
+                target, size = inputs.targets.image, (width, height)
+                if coarse is not None and step.variant.ground.coarse:
+                    target, size = coarse.framebuffer, half
+                target.use()
                 program = self._programs.get(("rectangles.vert", step.fragment), step.variant)
-                drawn.draw(number, program, textures, half if shrunk else (width, height))
+                drawn.draw(number, program, textures, size)
         if masks is not None:
             masks.release()
 
@@ -110,7 +112,8 @@ class GroundPass:
         """Fill and bind the ground's uniform block, and return the light on the ground."""
         scene, kept = prepared.scene, self._light_of(prepared)
         assert scene.ground is not None
-        toward = _first_light(scene, self._ambient(scene.environment))
+        lights = _world_lights(scene, self._ambient(scene.environment))
+        toward = np.array(lights[0].direction if lights else (0.0, 0.0, 1.0))
         values = ground_values(scene.ground, prepared.present, scene.props, kept.light, toward)
         self._block.write(GROUND_BLOCK.pack(values))
         self._block.bind_to_uniform_block(GROUND_BLOCK.binding)
@@ -240,8 +243,10 @@ class _SceneLight:
         self.texture.release()
 
 
-def _first_light(scene: Scene, ambient: Ambient) -> Array:
-    """Return the unit vector [3] to the brightest directional light; up if there is none."""
-    if not ambient.lights:
-        return np.array([0.0, 0.0, 1.0])
-    return to_map_frame(ambient.lights[0].direction, -scene.environment.yaw_deg)
+def _world_lights(scene: Scene, ambient: Ambient) -> list[DirectionalLight]:
+    """Return the directional lights in the world frame, brightest first."""
+    yaw_deg = -scene.environment.yaw_deg
+    return [
+        replace(light, direction=tuple(to_map_frame(light.direction, yaw_deg).tolist()))
+        for light in ambient.lights
+    ]
