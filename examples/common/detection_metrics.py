@@ -193,7 +193,7 @@ def operating_point(scores: Scores) -> OperatingPoint:
 
 def class_scores(scores: Scores) -> list[float]:
     """Return the score of each class with its best F1."""
-    return _THRESHOLDS[_curves(scores)[2].argmax(axis=1)].tolist()
+    return [float(each) for each in _THRESHOLDS[_curves(scores)[2].argmax(axis=1)]]
 
 
 def confusion(
