@@ -10,7 +10,7 @@ from fastgen.light.environment import load_environment, sky_irradiance, to_map_f
 from fastgen.light.ground_light import ground_light, mean_albedo
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.octahedral import octahedral_encode
-from fastgen.light.surrounding_change import FACES
+from fastgen.light.surrounding_change import FACES, lattice
 from fastgen.light.surrounding_light import surrounding_light
 from fastgen.scene import REC_709, Ground, Pose
 from fastgen.scene.boxes import container_box
@@ -114,6 +114,26 @@ def test_walls_between_stacks_have_the_mean_radiance_of_a_monte_carlo_integral(n
     brightest = (faces[:, 2:4] @ REC_709).max()
     assert np.abs(apart).mean() < 0.08 * brightest
     assert np.abs(apart).max() < 0.2 * brightest
+
+
+def test_walls_in_a_row_see_the_sky_that_all_boxes_together_leave():
+    """Boxes behind one another hide a part of the sky only once."""
+    row = [container_box("20", Pose((0.0, 4000.0 * k, 0.0), 3.0 * k)) for k in range(5)]
+    light = load_environment(bundled_hdris()["port_overcast"])
+    rays, apart = Rays(row, light, 0.0), []
+    size = row[0].half_mm
+    bounds = [(np.array([-1, -1, 0]) * size, np.array([1, 1, 2]) * size)] * len(row)
+    changes = surrounding_light(row, len(row) * [(ALBEDO,) * 3], bounds, light, 0.0, None)
+    for box, change in zip(row, changes, strict=True):
+        local, normals = lattice(size)
+        points, toward = box.center_mm + local @ box.rotation.T, normals @ box.rotation.T
+        for at, up, left in list(zip(points, toward, change.sky, strict=True))[::7]:
+            around = rays.rng.normal(size=(1500, 3))
+            way = up + around / np.linalg.norm(around, axis=1, keepdims=True)
+            seen = np.isinf(rays.first(np.tile(at, (len(way), 1)), way)[0]).mean()
+            apart.append(left[0] - seen)
+    assert np.abs(apart).mean() < 0.015
+    assert np.abs(apart).max() < 0.08
 
 
 @pytest.mark.parametrize(("name", "yaw_deg"), SUNS)
