@@ -55,7 +55,7 @@ LONGEST_S = 300
 
 
 @dataclass(frozen=True)
-class Labelled:
+class LabelledSpeed:
     """Speed of one process that renders labelled frames.
 
     Attributes:
@@ -84,8 +84,8 @@ class Row:
     """
 
     quality: str
-    single: Labelled
-    batch: Labelled
+    single: LabelledSpeed
+    batch: LabelledSpeed
     gpu_ms: float
     cpu_ms: float
     same: int
@@ -135,7 +135,9 @@ def count_same(generator: Generator) -> int:
     return same
 
 
-def labelled_frames(generator: Generator, images: int, batch: int) -> tuple[Labelled, Labelled]:
+def labelled_frames(
+    generator: Generator, images: int, batch: int
+) -> tuple[LabelledSpeed, LabelledSpeed]:
     """Return the speed of `render` and of `render_batch`.
 
     Both take turns, batch by batch, so that load of other processes affects both alike.
@@ -143,7 +145,7 @@ def labelled_frames(generator: Generator, images: int, batch: int) -> tuple[Labe
     seconds, cpu = np.zeros(2), np.zeros(2)
     for first in range(0, images, batch):
         indices, cameras = zip(*map(shown, range(first, min(first + batch, images))), strict=True)
-        # the first one of a pair samples the scenes and loads their lights
+        # loads the lights of the scenes, so that neither way is timed with that
         generator.render_batch(indices, cameras)
         for way in (0, 1) if first // batch % 2 else (1, 0):
             began, used = time.perf_counter(), time.process_time()
@@ -155,7 +157,7 @@ def labelled_frames(generator: Generator, images: int, batch: int) -> tuple[Labe
             seconds[way] += time.perf_counter() - began
             cpu[way] += time.process_time() - used
     single, batched = zip((images / seconds).tolist(), (1e3 * cpu / images).tolist(), strict=True)
-    return Labelled(*single), Labelled(*batched)
+    return LabelledSpeed(*single), LabelledSpeed(*batched)
 
 
 def draw_ms(generator: Generator, images: int) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Arguments of a batch of images: one scene and one camera for each image."""
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,6 +73,10 @@ def items_of(indices: Any, cameras: Any, scenes: Any) -> list[BatchItem]:
 
 
 def _listed(name: str, values: Any) -> list[Any]:
-    if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
-        raise ConfigError(f"{name}: {shown(values)} is not a list; give one for each image")
-    return list(values)
+    try:
+        if isinstance(values, (str, bytes)):
+            raise TypeError
+        return list(values)
+    except TypeError:
+        message = f"{name}: {shown(values)} is not a list; give one for each image"
+        raise ConfigError(message) from None

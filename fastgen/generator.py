@@ -219,8 +219,9 @@ class Generator:
     ) -> list[Sample]:
         """Render several labelled images, equal to those of `render`.
 
-        Each scene is prepared once, in any order of the images. Images are drawn one after the
-        other. On a GPU, the CPU waits once for up to 16 images instead of once for each image.
+        Each scene is prepared once, whatever the order of the images. Images are drawn one after
+        the other. On a GPU, the CPU waits once for up to 16 images instead of once for each image,
+        except with `normals` and in the quality "high", whose passes wait for each image.
 
         Args:
             indices: Number of the scene of each image; numbers may repeat. Give either this or
@@ -358,9 +359,12 @@ class Generator:
         return with_radiance(ImageRequest(prepared, camera, view, layer, normals=normals))
 
     def _rendered(self, images: list[ImageRequest], config: Config) -> list[Sample]:
-        """Render images and label them by the rules of a configuration."""
+        """Render images and label them by the rules of a configuration; empties the list."""
         samples: list[Sample] = []
-        for chunk in chunks(images):
+        waiting = chunks(images)[::-1]
+        images.clear()  # a scene's geometry is dropped after its last image
+        while waiting:
+            chunk = waiting.pop()
             with self.gpu.drawing() as renderer:
                 drawn = zip(renderer.render_batch(chunk), chunk, strict=True)
                 frames = [with_camera_model(frame, image, renderer) for frame, image in drawn]

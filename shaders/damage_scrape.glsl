@@ -16,9 +16,9 @@ bool scraped(int i, vec3 q) {
 // Mean wear of many scratches of a layer, as a factor of their density.
 const float SCRATCH_MEAN = 0.16;
 
-// Two layers of scratches that spread like a fan. Each cell of height `pitch` across has one, of its
-// own length and depth. Few are deep, and neighbours resemble each other: what scraped had few
-// points. Scratches end within the scrape.
+// Two layers of scratches that spread like a fan. Each cell across them, a.x mm high in the middle of
+// the first layer, has at most one. Neighbours resemble each other in length and place, as if one
+// object had made them. Scratches end within the scrape.
 float scrape_wear(int i, vec3 q) {
     vec4 a = damage_shape[3 * i];
     vec4 b = damage_shape[3 * i + 1];

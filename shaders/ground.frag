@@ -44,8 +44,8 @@ vec3 ground_color(vec3 at, vec3 ray, float depth) {
                  ground_lights(at, vec3(0.0, 0.0, 1.0), hidden, blur_m);
     vec3 color = m.albedo * light;
 #if GROUND_WET
-    vec3 toward = normalize(ray);
-    color += ground_mirror(at, toward, m) * open + ground_glare(at, toward, m, hidden, blur_m);
+    vec3 view_ray = normalize(ray);
+    color += ground_mirror(at, view_ray, m) * open + ground_glare(at, view_ray, m, hidden, blur_m);
 #endif
     return exposure * color;
 }

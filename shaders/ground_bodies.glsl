@@ -32,15 +32,16 @@ vec3 reciprocal(vec3 v) {
 }
 
 // The silhouette counts as one straight line through an edge, along which a ray enters and leaves the
-// body at once. Near a corner it is the farther outside of two lines, or the line would cast a shadow
-// beyond the end of its edge.
+// body at once. A second line ends it at corners, where the shadow would otherwise run on. The line that
+// hides less of the disc counts.
 // offset: Position in the axes of the body, from its centre in m. half_size: Half of its size.
 // inverse: Reciprocal of the unit vector to the middle of the disc, in the axes of the body.
 // spread: Angular radius of the disc. blur_m: Further radius, which filters the edge.
 // enter: Distances at which the ray passes the near plane of each axis.
 float hidden_share(vec3 offset, vec3 half_size, vec3 inverse, float spread, float blur_m, out vec3 enter) {
-    vec3 steps = abs(inverse), squared = inverse * inverse;
-    vec3 middle = -offset * inverse, width = half_size * steps, leave = middle + width;
+    // Length of the ray per metre along each axis.
+    vec3 per_axis = abs(inverse), squared = inverse * inverse;
+    vec3 middle = -offset * inverse, width = half_size * per_axis, leave = middle + width;
     enter = middle - width;
     float near = max(enter.x, max(enter.y, enter.z)), far = min(leave.x, min(leave.y, leave.z));
     float at_near = near == enter.x ? squared.x : near == enter.y ? squared.y : squared.z;
@@ -51,10 +52,10 @@ float hidden_share(vec3 offset, vec3 half_size, vec3 inverse, float spread, floa
     float distance_m = max(fma(near, at_far, far * at_near) / slopes, 0.0);
     float radius = fma(distance_m, spread, blur_m);
     // The other line is the one that the body leaves last if it grows by the radius on all sides.
-    vec3 first = fma(vec3(-radius), steps, enter), last = fma(vec3(radius), steps, leave);
+    vec3 first = fma(vec3(-radius), per_axis, enter), last = fma(vec3(radius), per_axis, leave);
     float start = max(first.x, max(first.y, first.z)), end = min(last.x, min(last.y, last.z));
-    float at_start = start == first.x ? steps.x : start == first.y ? steps.y : steps.z;
-    float at_end = end == last.x ? steps.x : end == last.y ? steps.y : steps.z;
+    float at_start = start == first.x ? per_axis.x : start == first.y ? per_axis.y : per_axis.z;
+    float at_end = end == last.x ? per_axis.x : end == last.y ? per_axis.y : per_axis.z;
     float other = fma(-radius, at_start + at_end, end - start) *
                   inversesqrt(fma(at_start, at_start, at_end * at_end));
     float x = clamp(min(inside, other) / radius, -1.0, 1.0), q = x * x;

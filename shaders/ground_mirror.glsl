@@ -3,6 +3,8 @@
 // vec3 ground_glare(vec3 at, vec3 ray, GroundMaterial m, float hidden, float blur_m): the same for the
 // directional lights, which the surroundings do not contain.
 
+#include "ground.constants"
+#include "reflectance.constants"
 #include "variant.constants"
 #include "ground.block"
 #include "view.block"
@@ -12,8 +14,6 @@
 #include "ground_light.glsl"
 #include "ground_material.glsl"
 #include "reflectance.glsl"
-
-const float WATER_INDEX = 1.333, WATER_F0 = 0.0204;   // Reflectance from in front.
 
 vec3 ground_mirror(vec3 at, vec3 ray, GroundMaterial m) {
     vec3 mirror = vec3(ray.xy, abs(ray.z));
@@ -45,7 +45,7 @@ vec3 ground_glare(vec3 at, vec3 ray, GroundMaterial m, float hidden, float blur_
         if (i > 0) hidden = hidden_from(i, at, blur_m);
         vec3 half_way = normalize(toward - ray);
         // The light's disc and the pixel spread half vectors by half their radius.
-        float alpha = m.roughness * m.roughness + 0.5 * (light_direction[i].w + pixel_angle);
+        float alpha = m.roughness * m.roughness + 0.5 * (light_direction[i].w + (1.0 + GROUND_COARSE) * pixel_angle);
         float lobe = ggx(alpha, half_way.z, toward.z, max(-ray.z, 1e-3));
         float reflected = fresnel(clamp(dot(toward, half_way), 0.0, 1.0), WATER_INDEX);
         sum += light_irradiance[i].rgb * (max(1.0 - hidden, 0.0) * reflected * lobe * toward.z);

@@ -160,6 +160,7 @@ def test_a_scene_is_sampled_once_whatever_the_order(generator, monkeypatch):
 def test_label_rules_and_single_layers_are_those_of_render(generator):
     rules = LabelConfig(min_visible_px=10**6)
     (found,) = generator.render_batch([1], labels=rules)
+    assert found.objects
     assert all(item.ignored for item in found.objects)
     assert_equal(found, generator.render(1, labels=rules))
     for ours, index in zip(generator.render_batch([0, 1], layer="rust"), (0, 1), strict=True):
@@ -179,6 +180,7 @@ def test_a_sample_keeps_no_other_images_in_memory(generator):
         ({"indices": [0], "scenes": []}, "render_batch: give either indices or scenes"),
         ({"indices": 3}, "indices: 3 is not a list"),
         ({"indices": "12"}, "indices: '12' is not a list"),
+        ({"indices": np.array(3)}, "indices: .*3.* is not a list"),
         ({"indices": [0, -1]}, r"indices\[1\]: -1 is not a whole number"),
         ({"indices": [0, 1], "cameras": ["A"]}, "cameras: 1 for 2 images; give one for each"),
         ({"indices": [0, 1], "cameras": 5}, "cameras: 5 is not a list"),

@@ -28,7 +28,7 @@ SUNS = [("port_golden", 90.0), ("port_golden", 0.0), ("port_noon", 90.0), ("port
 
 def face_radiance(boxes, light, yaw_deg):
     """Return the radiance [B, 6, 3] of the faces of boxes in one paint, without ground."""
-    bounds = [(box.corners_mm.min(axis=0), box.corners_mm.max(axis=0)) for box in boxes]
+    bounds = [(box.half_mm * (-1, -1, 0), box.half_mm * (1, 1, 2)) for box in boxes]
     paints = len(boxes) * [(ALBEDO,) * 3]
     changes = surrounding_light(boxes, paints, bounds, light, yaw_deg, None)
     return np.array([each.faces for each in changes])

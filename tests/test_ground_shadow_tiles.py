@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from fastgen import Config
+from fastgen.camera.projection import view_of
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.ground_plan import GroundDraw
 from fastgen.render.passes.ground import GroundPass
 from fastgen.scene import Camera, EnvironmentView, Ground, Neighbour, Pose, Prop, Spreader
-from fastgen.scene.optics import Weather
+from fastgen.scene.optics import Lamp, Weather
 
 SIZE = (480, 320)
 GROUND = Ground("concrete", -40.0, wear=0.0, reach_mm=40000.0)
@@ -21,6 +23,9 @@ CAMERAS = (
     Camera("high", (12000.0, -16000.0, 14000.0), (0.0, 1000.0, 0.0), 24.0),
     Camera("low", (-16000.0, 12000.0, 2500.0), (0.0, 2000.0, 300.0), 24.0),
 )
+OVERHEAD = "overhead"
+"""A lamp straight above the scene, at night."""
+
 LAMPS = ("port_night", "port_blue_hour", "port_aisle_night", "port_rail_dusk", "night")
 
 
@@ -34,7 +39,9 @@ def scene_of(generator, environment, yaw_deg):
         spreader=Spreader(),
         weather=Weather(),
         neighbours=(Neighbour(lifted, first.container, first.surface, first.decals),),
-        environment=EnvironmentView(environment, yaw_deg),
+        environment=EnvironmentView("night", yaw_deg, lamps=(Lamp(0.0, 90.0, 400.0),))
+        if environment == OVERHEAD
+        else EnvironmentView(environment, yaw_deg),
         ground=GROUND,
         props=PROPS,
         cameras=CAMERAS,
@@ -51,7 +58,7 @@ def with_all_bodies(plan):
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced"])
-@pytest.mark.parametrize("environment", ["port_noon", "port_golden", *LAMPS])
+@pytest.mark.parametrize("environment", ["port_noon", "port_golden", OVERHEAD, *LAMPS])
 def test_ground_shadows_are_complete_at_borders_of_tiles(
     generators, monkeypatch, environment, quality
 ):
@@ -61,6 +68,9 @@ def test_ground_shadows_are_complete_at_borders_of_tiles(
     for yaw_deg in (20.0, 145.0, 250.0):
         scene = scene_of(generator, environment, yaw_deg)
         for camera in CAMERAS:
+            view = view_of(camera, SIZE)
+            plan = plan_of(generator.gpu.renderer()._ground, PreparedScene(scene), view)
+            assert any(not each.variant.boxes for each in plan.plane)
             drawn = generator.render(scene=scene, camera=camera).image.astype(int)
             with monkeypatch.context() as patched:
                 patched.setattr(GroundPass, "plan", lambda *given: with_all_bodies(plan_of(*given)))

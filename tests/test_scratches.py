@@ -48,6 +48,14 @@ def test_a_pixel_sees_the_mean_of_the_scratches_in_it(gl):
     assert np.sqrt(np.mean(np.square(error))) < 0.4 * np.sqrt(np.mean(np.square(spread)))
 
 
+def test_scratches_end_within_their_scrape(gl):
+    y = np.random.default_rng(3).uniform(-1, 1, (4000, 1)) * HALF_MM[1]
+    for number in range(SCRAPES):
+        for end in (-HALF_MM[0], HALF_MM[0]):
+            found = wear(gl, number, np.c_[np.full_like(y, 1.001 * end), y], 0.05)
+            assert not found.any()
+
+
 @pytest.mark.parametrize("filter_mm", [10.0, 25.0, 80.0])
 def test_scratches_are_as_strong_from_afar(gl, filter_mm):
     places = np.random.default_rng(2).uniform(-1, 1, (8000, 2)) * HALF_MM

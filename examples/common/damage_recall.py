@@ -89,7 +89,7 @@ def recall_tables(outcomes: Sequence[Outcome], least: Sequence[float]) -> list[T
     change = _joined(outcomes, lambda each: each.change)
     by_box = _joined(outcomes, lambda each: hits(each.target, each.found, least))
     by_mask = _joined(outcomes, lambda each: hits(each.target, each.found, least, masks=True))
-    alarms = _joined(outcomes, lambda each: _counted(each.undamaged, least))
+    alarms = _joined(outcomes, lambda each: _counted_labels(each.undamaged, least))
     damages, small = labels > 1, areas < SMALL_PX
     numbers = {name: k for k, name in enumerate(SEGMENTATION_CLASSES, start=1) if k > 1}
     kinds = {"all damages": damages, **{name: labels == k for name, k in numbers.items()}}
@@ -100,8 +100,8 @@ def recall_tables(outcomes: Sequence[Outcome], least: Sequence[float]) -> list[T
     for name, chosen in {**kinds, **shapes}.items():
         found = [int(chosen.sum()), _percent(by_box[chosen]), _percent(by_mask[chosen])]
         k = numbers.get(name)
-        false = int((alarms == k if k else alarms > 1).sum()) if name in kinds else "–"
-        rows.append([name, f"{least[k - 1]:.2f}" if k else "–", *found, false])
+        false_alarms = int((alarms == k if k else alarms > 1).sum()) if name in kinds else "–"
+        rows.append([name, f"{least[k - 1]:.2f}" if k else "–", *found, false_alarms])
     heads = ["damages", "score", "labels", "by box, %", "by mask, %", "in undamaged images"]
     size_title = "Damages found by box, by size (square root of the visible pixels)"
     return [
@@ -116,7 +116,7 @@ def recall_tables(outcomes: Sequence[Outcome], least: Sequence[float]) -> list[T
     ]
 
 
-def _counted(found: Found, least: Sequence[float]) -> NDArray[np.int64]:
+def _counted_labels(found: Found, least: Sequence[float]) -> NDArray[np.int64]:
     """Return the labels of the detections that count [N]."""
     labels = found["labels"].numpy()
     counted: NDArray[np.int64] = labels[found["scores"].numpy() >= np.asarray(least)[labels - 1]]

@@ -192,8 +192,10 @@ def operating_point(scores: Scores) -> OperatingPoint:
 
 
 def class_scores(scores: Scores) -> list[float]:
-    """Return the score of each class with its best F1."""
-    return [float(each) for each in _THRESHOLDS[_curves(scores)[2].argmax(axis=1)]]
+    """Return the score of each class with its best F1; 0.99 for a class that is never found."""
+    f1 = _curves(scores)[2]
+    best = np.where(f1.max(axis=1) > 0, f1.argmax(axis=1), len(_THRESHOLDS) - 1)
+    return [float(each) for each in _THRESHOLDS[best]]
 
 
 def confusion(

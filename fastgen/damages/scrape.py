@@ -1,4 +1,4 @@
-"""Scrapes: parallel scratches to primer or steel, or with the paint of another object.
+"""Scrapes: bundles of scratches to primer or steel, or with the paint of another object.
 
 They move nothing. shaders/damage_scrape.glsl is the GLSL twin.
 """
@@ -56,7 +56,7 @@ _PAINT_LOSS = Range(0.5, 1.0)
 
 @dataclass(frozen=True)
 class ScrapeConfig:
-    """Bundle of parallel scratches without displacement.
+    """Bundle of scratches that spread slightly, without displacement.
 
     Attributes:
         length_mm: Length of the bundle.

@@ -31,7 +31,7 @@ Radiance = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """Light from one direction, in the frame of the environment map.
+    """Light from one direction, in the frame of the environment map where nothing else is said.
 
     Attributes:
         direction: Unit vector toward the light.

@@ -93,7 +93,7 @@ def damp_threshold(wetness: float) -> float:
 
 
 def _damp_share(wetness: float) -> float:
-    """Return the mean of covered() in shaders/noise.glsl over uniform noise, for damp ground.
+    """Return the mean share of damp ground: that of covered() in noise.glsl over uniform noise.
 
     Puddles add nothing, because they only cover ground that is damp already.
     """

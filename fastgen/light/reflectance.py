@@ -15,6 +15,12 @@ DIELECTRIC_INDEX = 1.5
 DIELECTRIC_F0 = ((DIELECTRIC_INDEX - 1) / (DIELECTRIC_INDEX + 1)) ** 2
 """Reflectance of a dielectric at normal incidence, by Fresnel's equations."""
 
+WATER_INDEX = 1.333
+"""Refractive index of water."""
+
+WATER_F0 = ((WATER_INDEX - 1) / (WATER_INDEX + 1)) ** 2
+"""Reflectance of water at normal incidence."""
+
 POROUS_LOSS = 0.8
 """Share of its albedo that a rough non-metal loses when it is soaked, see shaders/wetness.glsl."""
 

@@ -73,9 +73,9 @@ def surrounding_light(
         toward = normals @ box.rotation.T
         others = [j for j in range(len(boxes)) if j != i]
         directions = sky_directions() @ box.rotation.T
-        met = _met(points, directions, [boxes[j] for j in others])
-        distinct = _distinct(met, toward, directions)
-        covered = _covered(points, toward, [faces[j] for j in others], distinct)
+        hit = _hits(points, directions, [boxes[j] for j in others])
+        overlap = _overlap_factor(hit, toward, directions)
+        covered = _covered(points, toward, [faces[j] for j in others], overlap)
         hidden = covered.sum(axis=(0, 1))
         bounced = sum(
             (part.T @ radiance[j] for part, j in zip(covered, others, strict=True)),
@@ -98,7 +98,7 @@ def surrounding_light(
             above = left_of_sky(upper, upper - taken[:, None] * behind, open_[:, None])
             left, added = above / upper, ground + bounced
             seen = _mean_by_side(mirrored, normals)
-        bits = np.packbits(~met.any(axis=0), axis=1)  # directions that no other box hides
+        bits = np.packbits(~hit.any(axis=0), axis=1)  # directions that no other box hides
         own = _narrow(radiance[i])
         found.append(
             SurroundingLight(_narrow(left), _narrow(added), _narrow(below), bits, seen, own)
@@ -129,25 +129,25 @@ class _Faces(NamedTuple):
         return _Faces(every, np.array(normals), every.mean(axis=1))
 
 
-def _distinct(met: NDArray[np.bool_], toward: Array, directions: Array) -> Array:
+def _overlap_factor(hit: NDArray[np.bool_], toward: Array, directions: Array) -> Array:
     """Return the form factor of several boxes over the sum of their form factors [P].
 
     It is below 1 where boxes stand behind one another.
 
     Args:
-        met: Whether rays from points in directions meet each box [B, P, D].
+        hit: Whether rays from points in directions meet each box [B, P, D].
         toward: Normals at the points [P, 3].
         directions: The directions [D, 3], spread evenly over the sphere.
     """
     facing = np.maximum(toward @ directions.T, 0.0)
-    together = (facing * met.any(axis=0)).sum(axis=1)
-    summed = (facing * met.sum(axis=0)).sum(axis=1)
+    together = (facing * hit.any(axis=0)).sum(axis=1)
+    summed = (facing * hit.sum(axis=0)).sum(axis=1)
     found: Array = np.where(summed > 0, together / np.maximum(summed, 1e-9), 1.0)
     return found
 
 
 def _covered(
-    points: Array, toward: Array, faces: Sequence[_Faces], distinct: Array | float = 1.0
+    points: Array, toward: Array, faces: Sequence[_Faces], overlap: Array | float = 1.0
 ) -> Array:
     """Return the form factors [B, 6, P] of the faces of boxes at points with normals [P, 3].
 
@@ -155,7 +155,7 @@ def _covered(
         points: World positions in mm.
         toward: Unit normals there.
         faces: Faces of the boxes.
-        distinct: Factor [P] for boxes behind one another, see `_distinct`.
+        overlap: Factor [P] for boxes behind one another, see `_overlap_factor`.
     """
     found = np.zeros((len(faces), 6, len(points)))
     if not faces:
@@ -166,7 +166,7 @@ def _covered(
     # all boxes at once, because NumPy is slow for few points
     vectors = form_factors((corners[face] - points[at, None]).transpose(2, 1, 0))
     found.reshape(-1, len(points))[face, at] = np.maximum((vectors * toward[at].T).sum(axis=0), 0.0)
-    found *= distinct
+    found *= overlap
     found *= np.minimum(1.0, _MOST_HIDDEN / np.maximum(found.sum(axis=(0, 1)), 1e-9))
     return found
 
@@ -200,9 +200,9 @@ def _face_radiance(
         pairs = (own.corners[:, ::2] + own.middles[:, None]) / 2 + LIFT_MM * own.normals[:, None]
         points, normals = pairs.reshape(-1, 3), own.normals.repeat(2, axis=0)
         others = [j for j in range(count) if j != number]
-        met = _met(points, sky_directions(), [boxes[j] for j in others])
-        distinct = _distinct(met, normals, sky_directions())
-        covered = _covered(points, normals, [faces[j] for j in others], distinct)
+        hit = _hits(points, sky_directions(), [boxes[j] for j in others])
+        overlap = _overlap_factor(hit, normals, sky_directions())
+        covered = _covered(points, normals, [faces[j] for j in others], overlap)
         lit = sky_irradiance(light, normals, yaw_deg) * (1 - covered.sum(axis=(0, 1))[:, None])
         lit += directional_light(points, normals, boxes, light, yaw_deg)
         received[number] = lit.reshape(6, 2, 3).mean(axis=1)
@@ -229,7 +229,7 @@ def directional_light(
         return np.zeros((len(points), 3))
     toward = np.array([to_map_frame(each.direction, -yaw_deg) for each in light.lights])
     lit = np.maximum(normals @ toward.T, 0.0)
-    lit *= ~_met(points, toward, boxes).any(axis=0)
+    lit *= ~_hits(points, toward, boxes).any(axis=0)
     found: Array = lit @ np.array([each.light for each in light.lights])
     return found
 
@@ -277,7 +277,8 @@ def _from_ground(
     at = points[some] + middle[:, None] * level[some]
     at[:, 2] = paving.height_mm + LIFT_MM
     normals = np.broadcast_to(up, at.shape)
-    covered = _covered(at, normals, faces)
+    hit = _hits(at, sky_directions(), boxes)
+    covered = _covered(at, normals, faces, _overlap_factor(hit, normals, sky_directions()))
     hidden = covered.sum(axis=(0, 1))[:, None]
     whole = sky_irradiance(light, up[None], yaw_deg)
     left = whole - hidden * _sky_behind(at, covered, faces, sky)
@@ -309,7 +310,7 @@ def _mean_by_side(weighted: Array, normals: Array) -> NDArray[np.float32]:
     return np.asarray(found[:, :3] / np.maximum(found[:, 3:], 1e-6), np.float32)
 
 
-def _met(points: Array, toward: Array, boxes: Sequence[OrientedBox]) -> NDArray[np.bool_]:
+def _hits(points: Array, toward: Array, boxes: Sequence[OrientedBox]) -> NDArray[np.bool_]:
     """Return whether rays from P points in D directions meet each of several boxes [B, P, D]."""
     if not boxes:
         return np.zeros((0, len(points), len(toward)), bool)

@@ -15,8 +15,8 @@ _MOST_IMAGES = 16
 leaves 6 % of the waits."""
 
 _MOST_BYTES = 1 << 28
-"""Largest buffer, unless a single image needs more: OpenGL 4.4 sets no limit, and GPUs with 2 GiB
-of memory still have room for it."""
+"""Largest buffer; GPUs with 2 GiB of memory have room for it. A larger image is copied without
+one."""
 
 _TEXEL = 4
 """Bytes of a pixel of the labels, of the depth, and of the colour unless it is radiance."""

@@ -18,7 +18,13 @@ from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
 from fastgen.light import environment, prop_light
 from fastgen.light.ground_light import DAMP_SOFTNESS, DAMP_WETNESS, LINE_MM
-from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX, POROUS_LOSS
+from fastgen.light.reflectance import (
+    DIELECTRIC_F0,
+    DIELECTRIC_INDEX,
+    POROUS_LOSS,
+    WATER_F0,
+    WATER_INDEX,
+)
 from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
 from fastgen.render import glyph_runs, rust
 from fastgen.render.blocks import MAX_BOXES
@@ -302,6 +308,8 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "DIELECTRIC_F0": DIELECTRIC_F0,
         "DIELECTRIC_INDEX": DIELECTRIC_INDEX,
         "POROUS_LOSS": POROUS_LOSS,
+        "WATER_F0": WATER_F0,
+        "WATER_INDEX": WATER_INDEX,
     },
     "sky_visibility": lambda _: {
         "LIGHT_STEPS": f"{LIGHT_STEPS:.1f}",

@@ -206,8 +206,9 @@ def _shadows(
         view: Projection of the image, over whose pixels edges of shadows are filtered.
     """
     level, sine = np.array(light.direction[:2]), light.direction[2]
-    cosine = max(float(np.linalg.norm(level)), 1e-6)
-    away = -level / cosine
+    cosine = float(np.linalg.norm(level))
+    away = -level / cosine if cosine > 1e-6 else np.array([1.0, 0.0])  # any direction if overhead
+    cosine = max(cosine, 1e-6)
     longest = ground.reach_mm + np.linalg.norm(at, axis=-1).max()
     length = np.minimum(above_mm * cosine / sine, longest)
     ends = at + length[..., None] * away

@@ -128,7 +128,10 @@ class Renderer:
         """Draw images of one size one after the other, and copy them to the CPU.
 
         Args:
-            images: As many as a group of `batch_readback.chunks` has at most.
+            images: The images, at most one group of `batch_readback.chunks`.
+
+        Returns:
+            The frames in the same order.
         """
         found = [
             np.zeros((*each.view.size[::-1], 3), np.float32) if each.normals else None

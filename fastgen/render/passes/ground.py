@@ -33,9 +33,10 @@ Array = NDArray[np.float64]
 class GroundPass:
     """Draws the ground and the props over the background.
 
-    Reads: noise and the maps of the environment. Writes: colour, labels (0) and depth of the image,
-    only where the ray meets a prop, or the plane within the ground's reach. Alpha is the share that
-    is not the panorama.
+    Reads: noise and the maps of the environment. Writes: colour, labels (0) and depth of the image
+    where a sample of the pixel meets a prop, or the plane within the ground's reach. Depth is that
+    at the middle of the pixel, which is infinite if only other samples meet a prop. Alpha is the
+    share that is not the panorama.
     """
 
     def __init__(
