@@ -219,8 +219,8 @@ class Generator:
     ) -> list[Sample]:
         """Render several labelled images, equal to those of `render`.
 
-        Each scene is prepared once, whatever the order of the images. Images are drawn one after
-        the other. On a GPU, the CPU waits once for up to 16 images instead of once for each image,
+        Each scene is prepared once, even if other images come between its own. Images are drawn
+        one after the other. On a GPU, the CPU waits once for up to 16 images instead of once for each image,
         except with `normals` and in the quality "high", whose passes wait for each image.
 
         Args:
