@@ -220,8 +220,8 @@ class Generator:
         """Render several labelled images, equal to those of `render`.
 
         Each scene is prepared once, even if other images come between its own. Images are drawn
-        one after the other. On a GPU, the CPU waits once for up to 16 images instead of once for each image,
-        except with `normals` and in the quality "high", whose passes wait for each image.
+        one after the other. On a GPU, the CPU waits once for up to 16 images instead of once for
+        each image, except with `normals` and in the quality "high", whose passes wait for each.
 
         Args:
             indices: Number of the scene of each image; numbers may repeat. Give either this or
