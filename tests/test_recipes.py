@@ -124,7 +124,7 @@ def test_supervision(recipe, scenes):
         assert all(mask.any() for mask in found.mask)
     assert labels >= len(scenes)
     seen = 0
-    for path, _, found in names["prints"]:
+    for path, _, found in names["decals"]:
         quads = [
             np.reshape(thing["quad"], (4, 2))
             for thing in scenes[Path(path).stem]["objects"]
