@@ -146,6 +146,13 @@ def _overlap_factor(hit: NDArray[np.bool_], toward: Array, directions: Array) ->
     return found
 
 
+def _overlap(points: Array, normals: Array, boxes: Sequence[OrientedBox]) -> Array | float:
+    """Return `_overlap_factor` of boxes at points [P, 3]; no rays are needed for a single box."""
+    if len(boxes) < 2:
+        return 1.0
+    return _overlap_factor(_hits(points, sky_directions(), boxes), normals, sky_directions())
+
+
 def _covered(
     points: Array, toward: Array, faces: Sequence[_Faces], overlap: Array | float = 1.0
 ) -> Array:
@@ -200,8 +207,7 @@ def _face_radiance(
         pairs = (own.corners[:, ::2] + own.middles[:, None]) / 2 + LIFT_MM * own.normals[:, None]
         points, normals = pairs.reshape(-1, 3), own.normals.repeat(2, axis=0)
         others = [j for j in range(count) if j != number]
-        hit = _hits(points, sky_directions(), [boxes[j] for j in others])
-        overlap = _overlap_factor(hit, normals, sky_directions())
+        overlap = _overlap(points, normals, [boxes[j] for j in others])
         covered = _covered(points, normals, [faces[j] for j in others], overlap)
         lit = sky_irradiance(light, normals, yaw_deg) * (1 - covered.sum(axis=(0, 1))[:, None])
         lit += directional_light(points, normals, boxes, light, yaw_deg)
@@ -277,8 +283,7 @@ def _from_ground(
     at = points[some] + middle[:, None] * level[some]
     at[:, 2] = paving.height_mm + LIFT_MM
     normals = np.broadcast_to(up, at.shape)
-    hit = _hits(at, sky_directions(), boxes)
-    covered = _covered(at, normals, faces, _overlap_factor(hit, normals, sky_directions()))
+    covered = _covered(at, normals, faces, _overlap(at, normals, boxes))
     hidden = covered.sum(axis=(0, 1))[:, None]
     whole = sky_irradiance(light, up[None], yaw_deg)
     left = whole - hidden * _sky_behind(at, covered, faces, sky)
