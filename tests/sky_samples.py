@@ -14,6 +14,19 @@ def texel_grid(height: int) -> tuple[np.ndarray, np.ndarray]:
     return direction, np.sin(polar) * (np.pi / height) ** 2
 
 
+def quarter_sphere(steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return directions [N, 3] with z > 0 and y > 0, and their solid angles [N].
+
+    The other half of the upper hemisphere mirrors them.
+    """
+    middle = (np.arange(steps) + 0.5) / steps * np.pi
+    theta, phi = (each.ravel() for each in np.meshgrid(middle / 2, middle))
+    direction = np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
+    )
+    return direction, np.sin(theta) * (np.pi / 2 / steps) * (np.pi / steps)
+
+
 def even_directions(count: int) -> np.ndarray:
     """Return directions [count, 3] of a Fibonacci sphere; each covers the same solid angle."""
     k = np.arange(count) + 0.5

@@ -9,9 +9,11 @@ from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.gl import open_context
-from fastgen.scene import Camera, EnvironmentView, Ground, Pose, Prop, Spreader
+from fastgen.scene import Camera, EnvironmentView, Ground, Pose, Prop
 from fastgen.scene.optics import Weather
 from tests.glsl import blocks, run
+from tests.plain import bare
+from tests.sky_samples import quarter_sphere
 
 SIZE = (200, 150)
 WATER = 1.33
@@ -62,19 +64,14 @@ def test_wet_ground_reflects_the_share_of_a_light_that_water_does(gl, slope_deg,
     slope = np.deg2rad(slope_deg)
     toward = np.tile([np.sin(slope), 0, np.cos(slope), 0], (4, 1))
     kept = blocks(gl, light_direction=toward, light_irradiance=np.ones((4, 4)), light_count=1)
-    middle = (np.arange(STEPS) + 0.5) / STEPS * np.pi
-    theta, phi = np.meshgrid(middle / 2, middle)
-    views = np.stack(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
-    ).reshape(-1, 3)
+    views, angles = quarter_sphere(STEPS)
     body = (
         '#include "ground_mirror.glsl"\n'
         f"vec4 f(vec4 x) {{ GroundMaterial wet = GroundMaterial(vec3(0.0), {roughness});"
         " return vec4(ground_glare(vec3(0.0), -x.xyz, wet, 0.25, 0.01), 1.0); }"
     )
     radiance = run(gl, body, np.c_[views, np.zeros(len(views))], lights=1)[:, 0]
-    cell = np.sin(theta).ravel() * (np.pi / 2 / STEPS) * (2 * np.pi / STEPS)
-    found = (radiance * views[:, 2] * cell).sum() / (np.pi * np.cos(slope))
+    found = (radiance * views[:, 2] * 2 * angles).sum() / (np.pi * np.cos(slope))
     # a quarter of the light is hidden
     assert found == pytest.approx(0.75 * reflected_share(roughness, slope), rel=0.06)
     del kept
@@ -85,13 +82,8 @@ def test_glare_lies_where_the_sun_is_mirrored_and_ends_in_shadows():
         first = made.scene(0)
         sun = made.gpu.renderer().ambient(EnvironmentView("port_afternoon", 0.0)).lights[0]
         scene = replace(
-            first,
-            neighbours=(),
-            props=(),
-            decals=(),
+            bare(first),
             damages=(),
-            seals=(),
-            spreader=Spreader(),
             weather=Weather(),
             container=replace(first.container, present=False),
             environment=EnvironmentView("port_afternoon", 0.0),

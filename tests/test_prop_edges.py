@@ -9,8 +9,9 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.scene import Camera, EnvironmentView, Ground, Pose, Prop, Spreader
+from fastgen.scene import Camera, EnvironmentView, Ground, Pose, Prop
 from fastgen.scene.optics import Weather
+from tests.plain import bare
 
 SIZE = (160, 120)
 
@@ -21,13 +22,9 @@ def test_edge_pixels_of_a_prop_before_the_sky_are_covered_by_the_share_of_sample
     with Generator(Config.preset("gate"), seed=3, size=SIZE) as made:
         first = made.scene(0)
         scene = replace(
-            first,
-            neighbours=(),
+            bare(first),
             props=(prop,),
-            decals=(),
             damages=(),
-            seals=(),
-            spreader=Spreader(),
             weather=Weather(),
             container=replace(first.container, present=False),
             environment=EnvironmentView("port_overcast", 0.0),

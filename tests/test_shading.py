@@ -9,6 +9,7 @@ from fastgen.render.gl import open_context
 from fastgen.render.noise import noise_tiles
 from fastgen.render.textures import noise_texture
 from tests.glsl import blocks, run
+from tests.sky_samples import quarter_sphere
 
 
 @pytest.fixture(scope="module")
@@ -149,20 +150,14 @@ def test_black_paint_reflects_a_sun_with_the_split_sum_albedo(gl, slope_deg):
     slope, roughness, steps = np.deg2rad(slope_deg), 0.31, 120
     toward = np.tile([np.sin(slope), 0, np.cos(slope), 0], (4, 1))
     kept = blocks(gl, yaw=(1, 0), light_direction=toward, light_irradiance=np.ones((4, 4)))
-    theta, phi = np.meshgrid(
-        (np.arange(steps) + 0.5) / steps * np.pi / 2, (np.arange(steps) + 0.5) / steps * np.pi
-    )
-    views = np.stack(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
-    ).reshape(-1, 3)
+    views, angles = quarter_sphere(steps)
     body = (
         '#include "directional_light.glsl"\n'
         f"vec4 f(vec4 x) {{ Material black = Material(vec3(0.0), {roughness}, 0.0);"
         " return vec4(light_reflection(brdf_terms(black, vec3(0.0, 0.0, 1.0), x.xyz), 0), 1.0); }"
     )
     radiance = run(gl, body, np.c_[views, np.zeros(len(views))], white_light(gl))[:, 0]
-    cell = np.sin(theta).ravel() * (np.pi / 2 / steps) * (2 * np.pi / steps)
-    found = (radiance * views[:, 2] * cell).sum() / (np.pi * np.cos(slope))
+    found = (radiance * views[:, 2] * 2 * angles).sum() / (np.pi * np.cos(slope))
     column = np.cos(slope) * 32 - 0.5
     scale, bias = (
         np.interp(column, np.arange(32), dfg_table()[int(roughness * 32), :, k]) for k in (0, 1)
