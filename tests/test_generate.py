@@ -33,6 +33,7 @@ from tests.interruptible import interruptible
 
 SMALL = RenderSettings((64, 64))
 ARGUMENTS = ["--images", "14", "--size", "96x80", "--seed", "3"]
+MANY = ["--images", "60", "--shard", "1"]
 
 
 def run(out, *more):
@@ -46,6 +47,26 @@ def dataset(tmp_path_factory):
     out = tmp_path_factory.mktemp("made") / "dataset"
     assert main(["generate", str(out), *ARGUMENTS, "--workers", "2"]) == 0
     return out
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Dataset of so many shards that a run is far from its end when the first of them exist."""
+    out = tmp_path_factory.mktemp("whole") / "dataset"
+    assert run(out, *MANY) == 0
+    return out
+
+
+def begun(out):
+    """Start the run of `whole` with two workers and return it once it has made two shards."""
+    command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS, *MANY]
+    process = interruptible(
+        [*command, "--workers", "2"], stderr=subprocess.PIPE, start_new_session=True
+    )
+    while len(list(out.glob("shards/*.json"))) < 2:
+        assert process.poll() is None  # a finished run cannot be stopped
+        time.sleep(0.01)
+    return process
 
 
 def records(out):
@@ -175,21 +196,14 @@ def test_running_again_restores_what_is_missing(dataset, tmp_path, lost):
     assert content(out) == content(dataset)
 
 
-def test_a_killed_run_is_finished_to_the_same_bytes(dataset, tmp_path):
+def test_a_killed_run_is_finished_to_the_same_bytes(dataset, whole, tmp_path):
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS, "--shard", "1"]
-    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
-    deadline = time.monotonic() + 60
-    while len(list(out.glob("shards/*.json"))) < 2 and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert process.poll() is None  # a finished run cannot be killed
+    process = begun(out)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    assert len(list(out.glob("shards/*.json"))) >= 2
     assert "digest" not in json.loads((out / "dataset.json").read_text())
-    assert run(out, "--shard", "1") == 0
-    assert run(tmp_path / "whole", "--shard", "1") == 0
-    assert content(out) == content(tmp_path / "whole")
+    assert run(out, *MANY) == 0
+    assert content(out) == content(whole)
     images = {k: v for k, v in content(dataset).items() if k.startswith("images")}
     assert images.items() <= content(out).items()
 
@@ -338,23 +352,17 @@ def test_a_second_run_on_the_same_folder_is_refused(dataset, tmp_path, capsys):
     assert run(out) == 0
 
 
-def test_ctrl_c_stops_cleanly_and_the_run_can_be_continued(dataset, tmp_path):
+def test_ctrl_c_stops_cleanly_and_the_run_can_be_continued(whole, tmp_path):
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS]
-    process = interruptible(command, stderr=subprocess.PIPE, start_new_session=True)
-    deadline = time.monotonic() + 60
-    while not (out / "dataset.json").exists() and time.monotonic() < deadline:
-        time.sleep(0.02)
-    time.sleep(1.0)
-    assert process.poll() is None
+    process = begun(out)
     os.killpg(process.pid, signal.SIGINT)
-    error = process.communicate(timeout=30)[1]
+    error = process.communicate(timeout=300)[1]
     assert process.returncode == 130
     assert error.splitlines()[-1] == "fastgen: stopped; run the same command again to go on"
     assert "Traceback" not in error
     assert not [p for p in out.iterdir() if p.name.startswith(".")]
-    assert run(out) == 0
-    assert content(out) == content(dataset)
+    assert run(out, *MANY) == 0
+    assert content(out) == content(whole)
 
 
 @pytest.mark.parametrize("seed", range(12))
