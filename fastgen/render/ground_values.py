@@ -17,6 +17,7 @@ from fastgen.light.ground_light import (
 )
 from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.constants import GROUND_FADE_START
+from fastgen.render.rust import normal_threshold
 from fastgen.scene import Ground, Prop
 from fastgen.scene.boxes import OrientedBox, prop_box
 from fastgen.scene.limits import MM
@@ -87,7 +88,7 @@ def ground_values(
         "ground_wear": ground.wear,
         # thresholds just outside of 0..1 leave nothing or everything however blurred
         "line_threshold": 1.3 - 1.6 * ground.lines if ground.lines else 9.0,
-        "stain_threshold": _normal_threshold(_STAINED * ground.wear),
+        "stain_threshold": float(normal_threshold(_STAINED * ground.wear)),
         "damp_threshold": damp_threshold(wet) if wet else 9.0,
         "puddle_threshold": 1.1 - 0.65 * wet**1.5 if wet else 9.0,
         "slab_mm": 4000 + np.mod(abs(ground.noise_offset_mm[0]), 2000.0),
@@ -114,12 +115,3 @@ def clear_radius_mm(ground: Ground, members: Sequence[Member], props: Sequence[P
     boxes = [member.box for member in members] + [prop_box(prop) for prop in props]
     far = [np.linalg.norm(box.corners_mm[:, :2], axis=-1).max() for box in boxes]
     return min(max(far, default=0.0) + _CLEARANCE_MM, GROUND_FADE_START * ground.reach_mm)
-
-
-def _normal_threshold(share: float) -> float:
-    """Return the deviation from the mean that a share of a normal distribution exceeds.
-
-    Abramowitz and Stegun 1964, 26.2.22, for shares up to a half.
-    """
-    t = np.sqrt(-2 * np.log(max(share, 1e-6)))
-    return float(t - (2.30753 + 0.27061 * t) / (1 + t * (0.99229 + 0.04481 * t)))

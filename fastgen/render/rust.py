@@ -155,15 +155,23 @@ def rusted(
     return np.minimum(mean, 0.95), share
 
 
+def normal_threshold(share: Array | float) -> Array:
+    """Return the values that shares of a normal distribution exceed, in standard deviations.
+
+    Abramowitz and Stegun 1964, 26.2.22.
+    """
+    rare = np.minimum(share, 1 - share)
+    t = np.sqrt(-2 * np.log(np.maximum(rare, 1e-6)))
+    quantile = t - (2.30753 + 0.27061 * t) / (1 + t * (0.99229 + 0.04481 * t))
+    return np.asarray(np.where(np.less(share, 0.5), quantile, -quantile))
+
+
 def _spread(share: Array, reach: float, softness: float) -> Array:
     """Return the mean of the shader's `normal_covered`, `reach` below the threshold of `share`.
 
     Both approximations are those of shaders/noise.glsl.
     """
-    rare = np.minimum(share, 1 - share)
-    t = np.sqrt(-2 * np.log(np.maximum(rare, 1e-6)))
-    quantile = t - (2.30753 + 0.27061 * t) / (1 + t * (0.99229 + 0.04481 * t))
-    x = (reach - np.where(share < 0.5, quantile, -quantile)) / np.hypot(1.0, softness)
+    x = (reach - normal_threshold(share)) / np.hypot(1.0, softness)
     return np.asarray(1 / (1 + np.exp(-x * (1.5976 + 0.070566 * x * x))))
 
 
