@@ -369,6 +369,31 @@ def test_light_between_white_boxes_in_an_even_sky_is_as_bright_as_the_sky():
     assert (found.sky + found.added).max() < 1.01
 
 
+def test_the_top_of_a_lower_rail_is_in_the_shade_of_a_neighbour():
+    """Its normal is that of the roof, which is in the open."""
+    even = Ambient.of(prefilter_environment("even", np.ones((64, 128, 3), np.float32)))
+    mesh = ShapeLibrary().container("20")
+    boxes = [container_box("20", Pose((0.0, y, 0.0))) for y in (0.0, 2438.0 + 700.0)]
+    black = (0.0, 0.0, 0.0)
+    (found, _) = surrounding_light(
+        boxes, 2 * [black], 2 * [mesh.bounds_mm], even, 0.0, Paving(0.0, black)
+    )
+    share = found.vertex_light(open_sky(mesh.normals), np.ones_like(mesh.normals), mesh)[:, 0]
+    along, across, height = mesh.positions_mm.T
+    rail = (mesh.normals[:, 2] > 0.7) & (height < 400) & (np.abs(along) < 2500)
+    roof = (mesh.normals[:, 2] > 0.99) & (height > 2500) & (np.abs(across) < 500)
+    rng = np.random.default_rng(3)
+    around = rng.normal(size=(4000, 3))
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    for vertex in rng.choice(np.flatnonzero(rail & (across > 1100)), 12):
+        toward = mesh.normals[vertex] + around
+        start = np.tile(mesh.positions_mm[vertex].astype(float), (len(toward), 1))
+        beside_wall = toward[:, 1] > 0
+        seen = 1 - each_enters(start, toward, boxes[1])[beside_wall].mean()
+        assert seen / 4 < share[vertex] < 1.5 * seen
+    assert np.abs(share[roof] - 1).max() < 0.02
+
+
 def each_enters(points, rays, box):
     """Return whether the ray [N, 3] from each point [N, 3] meets a box."""
     start, along = (points - box.center_mm) @ box.rotation, rays @ box.rotation

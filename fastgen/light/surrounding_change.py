@@ -15,6 +15,9 @@ LIFT_MM = 5.0
 _STEP_MM = 1000.0
 """Largest distance between points on a face of the outer box."""
 
+_NORMAL_COUNTS_MM = 150.0
+"""Distance that counts as much as one in the cosine to a side: the depth of rails and recesses."""
+
 _LEAST = 0.02
 """Least light of a vertex, relative to the open."""
 
@@ -128,7 +131,7 @@ def _lattice_places(mesh: Mesh) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     low, high = (np.asarray(bound, np.float64) for bound in mesh.bounds_mm)
     counts = _counts(high - low)
     first = np.cumsum([0, *(a * b for a, b in counts)])
-    face = side_of(mesh.normals)
+    face = _sides_beside(mesh)
     corner = np.zeros((4, len(face)), np.intp)
     weight = np.zeros((4, len(face)), np.float32)
     share = (mesh.positions_mm - low) / (high - low)
@@ -143,6 +146,19 @@ def _lattice_places(mesh: Mesh) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
             corner[k, chosen] = first[number] + (i + p) * b_count + j + q
             weight[k, chosen] = (dx if p else 1 - dx) * (dy if q else 1 - dy)
     return corner, weight
+
+
+def _sides_beside(mesh: Mesh) -> NDArray[np.intp]:
+    """Return the side [V] of the outer box that each vertex belongs to.
+
+    That is the nearest one, and of two near ones that which faces more along the normal. The
+    normal alone does not tell: the top of a wall's lower rail is in the shade of what stands beside
+    the wall, and not in that of the roof.
+    """
+    low, high = (np.asarray(bound, np.float64) for bound in mesh.bounds_mm)
+    outward = mesh.positions_mm + _NORMAL_COUNTS_MM * mesh.normals
+    costs = [sign * ((high if sign > 0 else low)[axis] - outward[:, axis]) for axis, sign in FACES]
+    return np.asarray(np.argmin(costs, axis=0))
 
 
 @lru_cache(maxsize=32)
