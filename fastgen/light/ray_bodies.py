@@ -19,6 +19,10 @@ Floats = NDArray[np.float32]
 LIFT_MM = 1.0
 """Distance from a surface at which rays from it start."""
 
+_APART_MM = 8.0
+"""Largest distance of a visible point from its surface, see RayBodies.settled. Lens distortion bends
+only the corners of triangles, and so moves points of far walls by up to 5 mm."""
+
 
 def check_rays() -> None:
     """Raise ConfigError if Embree is not available on this machine."""
@@ -114,6 +118,19 @@ class RayBodies:
             radiance[lit] += self._paint[triangle[lit]] * (cosine[lit, None] * each.light)
         radiance[~front] = 0
         return which, radiance
+
+    def settled(self, place_mm: Floats, normal: Floats) -> Floats:
+        """Return places [K, 3] near surfaces with unit normals [K, 3], moved along these onto them.
+
+        Those farther than _APART_MM from a surface stay.
+        """
+        if not len(place_mm):
+            return place_mm
+        start = (place_mm + _APART_MM * normal).astype(np.float32)
+        found = self._scene.run(start, (-normal).astype(np.float32), query="INTERSECT", output=True)
+        away = _APART_MM - found["tfar"]
+        away[(found["primID"] < 0) | (away < -_APART_MM)] = 0.0
+        return np.asarray(place_mm + away[:, None] * normal, np.float32)
 
     def _unoccluded(self, start_mm: Floats, toward: Floats) -> NDArray[np.bool_]:
         """Return for each point [K, 3] whether no surface is in one direction [3]."""

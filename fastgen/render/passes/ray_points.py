@@ -74,6 +74,8 @@ class RayPass:
             yaw_deg: Rotation of the environment about the vertical.
         """
         points = self.read(inputs).turned(rotation_of(pose), pose.position_mm)
+        if inputs.view.distortion is not None:
+            points = replace(points, place_mm=bodies.settled(points.place_mm, points.normal))
         self._store(points, traced_light(points, bodies, sky, yaw_deg))
         inputs.textures["ray_point_ids"] = self._keys
         inputs.textures["ray_point_positions"] = self._places
