@@ -199,13 +199,14 @@ def test_an_endless_stream_continues_and_resumes():
 
 @pytest.mark.usefixtures("bare")
 def test_shuffled_orders_change_with_the_epoch_and_are_the_same_on_all_ranks():
-    data = dataset()
-    orders = []
-    for epoch in (0, 1):
+    def order(epoch, *part):
+        data = dataset()  # each rank is a process with a dataset of its own
         data.set_epoch(epoch)
-        orders.append(list(ShardSampler(data, shuffle=True)))
-        parts = [list(ShardSampler(data, rank, 2, shuffle=True)) for rank in (0, 1)]
-        assert parts == [orders[-1][0::2], orders[-1][1::2]]
+        return list(ShardSampler(data, *part, shuffle=True))
+
+    orders = [order(epoch) for epoch in (0, 1)]
+    for epoch, whole in enumerate(orders):
+        assert [order(epoch, rank, 2) for rank in (0, 1)] == [whole[0::2], whole[1::2]]
     assert orders[0] != orders[1]
     assert sorted(orders[0]) == sorted(orders[1]) == list(range(23))
 

@@ -45,6 +45,15 @@ def test_a_plain_loop_shuffles_each_pass_in_its_own_way():
 
 
 @pytest.mark.parametrize("make", [dataset, stream])
+@pytest.mark.parametrize("workers", [0, 2])
+def test_a_new_loader_in_each_epoch_goes_on_to_the_next(make, workers):
+    """A loop over `Loader(data)` inside a loop over epochs must not train on one epoch only."""
+    data = make()
+    found = [passes(Loader(data, batch_size=4, num_workers=workers), 1)[0] for _ in range(3)]
+    assert found == [in_epoch(epoch) for epoch in range(3)]
+
+
+@pytest.mark.parametrize("make", [dataset, stream])
 def test_a_pass_that_was_left_early_counts_and_one_without_a_batch_does_not(make):
     loader = Loader(make(), batch_size=4)
     iter(loader)

@@ -95,6 +95,19 @@ def test_bad_arguments_are_named(arguments, words):
         dataset_of(**arguments)
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("render", "draft", "render: str is not RenderSettings"),
+        ("scenes", {"split": "train"}, "scenes: dict is not SceneSettings"),
+        ("items", None, "items: NoneType is not ItemSettings"),
+    ],
+)
+def test_settings_of_another_type_are_named(name, value, words):
+    with pytest.raises(ConfigError, match=words):
+        ContainerDataset("imdg", **{name: value})
+
+
 def test_the_last_epoch_has_scenes_and_the_next_is_refused():
     data = dataset()
     last = (2**63 - 1 - 10**9) // 10**9  # epoch e has scenes e x 10^9 to (e + 1) x 10^9
@@ -115,6 +128,8 @@ def test_bad_ranks_states_and_batches_are_named():
             ShardSampler(dataset(), rank, world)
     with pytest.raises(ConfigError, match="batch_size: 0"):
         Loader(dataset(), batch_size=0)
+    with pytest.raises(ConfigError, match="sampler: a Loader divides the positions itself"):
+        Loader(dataset(), sampler=[0, 1])
     with pytest.raises(ConfigError, match="dataset: list is neither"):
         Loader([1, 2])
     with pytest.raises(ConfigError, match="dataset: str is not a ContainerDataset"):

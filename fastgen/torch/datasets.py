@@ -57,10 +57,6 @@ class ContainerDataset(Dataset[Item]):
         scenes: Which scenes an epoch has, and which cameras see them.
         items: What an item holds.
 
-    Attributes:
-        epoch_settings: Number of calls of `set_epoch`, by which loaders and samplers notice that
-            the epoch of their next pass was chosen.
-
     Raises:
         ConfigError: A value is not valid.
     """
@@ -79,6 +75,14 @@ class ContainerDataset(Dataset[Item]):
         self.config = Config.checked(config)
         self.seed = whole("seed", seed)
         self.length = whole("length", length, 1, MAX_LENGTH)
+        for name, given, kind in (
+            ("render", render, RenderSettings),
+            ("scenes", scenes, SceneSettings),
+            ("items", items, ItemSettings),
+        ):
+            if not isinstance(given, kind):
+                words = f"{type(given).__name__} is not {kind.__name__}; give {kind.__name__}(...)"
+                raise ConfigError(f"{name}: {words}")
         self.render, self.scenes, self.items = render, scenes, items
         self.cameras = chosen_cameras(task, self.config, scenes.cameras)
         check_items(task, items)
@@ -86,7 +90,7 @@ class ContainerDataset(Dataset[Item]):
         self._plan = Plan(self.config, self.seed, self.cameras, scenes)
         # shared memory, so that persistent workers see it change, forked or spawned
         self._epoch = torch.zeros(1, dtype=torch.int64).share_memory_()
-        self.epoch_settings = 0
+        self._epoch_chosen = True  # for the next pass
         self._taken = torch.zeros(2, dtype=torch.int64).share_memory_()  # items, and if it warned
         self._epoch_config = (0, config_of(scenes.curriculum, self.config, 0))
         # epoch and index of the last scene, and the scene with and without damages
@@ -142,8 +146,18 @@ class ContainerDataset(Dataset[Item]):
         epoch = whole("epoch", epoch, 0, MAX_EPOCH)
         config_of(self.scenes.curriculum, self.config, epoch)  # fails here, not in a worker
         self._epoch.fill_(epoch)
-        self.begin_count()
-        self.epoch_settings += 1
+        self._taken[0] = 0
+        self._epoch_chosen = True
+
+    def begin_pass(self) -> None:
+        """Go to the next epoch, unless one was set since the last pass over the data.
+
+        Samplers and streaming loaders call this, so a new loader continues where the last one was.
+        """
+        if not self._epoch_chosen:
+            self.set_epoch(self.epoch + 1)
+        self._epoch_chosen = False
+        self._taken[0] = 0
 
     @property
     def collate(self) -> Collate:
@@ -197,10 +211,6 @@ class ContainerDataset(Dataset[Item]):
         names = list(self.config.cameras)
         image_id = sample.scene.index * len(names) + names.index(sample.camera.name)
         return item_of(sample, self.task, self.items, self.config_at(epoch).labels, image_id)
-
-    def begin_count(self) -> None:
-        """Count items anew, because a sampler begins a pass."""
-        self._taken[0] = 0
 
     def count_item(self) -> None:
         """Count an item that a pass takes, and warn once if a second pass has the same scenes."""

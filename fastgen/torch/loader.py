@@ -14,25 +14,10 @@ from fastgen.torch.plan import MAX_EPOCH, shard
 from fastgen.validation import whole
 
 
-class _Passes:
-    """Advances a dataset by one epoch when a pass begins and no epoch was set since the last."""
-
-    def __init__(self, dataset: ContainerDataset) -> None:
-        self._dataset = dataset
-        self._last_setting = -1
-
-    def begin(self) -> None:
-        data = self._dataset
-        if data.epoch_settings == self._last_setting:
-            data.set_epoch(data.epoch + 1)
-        self._last_setting = data.epoch_settings
-        data.begin_count()
-
-
 class ShardSampler(Sampler[int]):
     """Sampler of one rank. Each position occurs once over all ranks; none is repeated as padding.
 
-    Each pass goes to the next epoch, unless `set_epoch` has chosen one since the last pass.
+    Each pass over the dataset goes to its next epoch, unless `set_epoch` has chosen one.
 
     Args:
         dataset: Its length, epoch and seed decide the positions.
@@ -56,7 +41,6 @@ class ShardSampler(Sampler[int]):
         self.start = 0
         self._dataset, self._shuffle = dataset, shuffle
         self._rank, self._world_size = rank, world_size
-        self._passes = _Passes(dataset)
 
     @property
     def part(self) -> tuple[int, int]:
@@ -73,8 +57,8 @@ class ShardSampler(Sampler[int]):
         return len(range(rank, len(self._dataset), world_size))
 
     def __iter__(self) -> Iterator[int]:
-        self._passes.begin()
         data = self._dataset
+        data.begin_pass()
         places = range(len(data))
         if self._shuffle:
             order = stream(data.seed, data.epoch, "order").permutation(len(data)).tolist()
@@ -86,8 +70,9 @@ class ShardSampler(Sampler[int]):
 class Loader:
     """Batches of a ContainerDataset or ContainerStream, with a position that can be saved.
 
-    Each pass goes to the next epoch, unless `set_epoch` has chosen one since the last pass. A pass
-    counts as soon as it has delivered a batch.
+    Each pass over the dataset goes to its next epoch, unless `set_epoch` has chosen one since the
+    last pass, which may have been that of another Loader. A pass counts as soon as it has delivered
+    a batch.
 
     `state_dict` counts the samples handed out, not those that workers have prepared. After
     `load_state_dict`, a Loader with the same dataset continues with the next sample. Batch size,
@@ -142,8 +127,13 @@ class Loader:
             )
         else:
             self._items, self.sampler = dataset, ShardSampler(dataset, rank, world_size, shuffle)
+        for name in ("sampler", "batch_sampler"):
+            if name in options:
+                raise ConfigError(
+                    f"{name}: a Loader divides the positions itself; leave it out, or give it to "
+                    "torch's own DataLoader"
+                )
         self._length = dataset.length
-        self._passes = _Passes(self._items)
         self._next_pass = (0, 0)  # epoch and first position; passes in other epochs begin at 0
         self._reached = (0, 0)  # epoch and position after the last sample
         self._loader: DataLoader[Any] = DataLoader(
@@ -212,7 +202,7 @@ class Loader:
         start = self._in_this_epoch(self._next_pass)
         self._next_pass = (0, 0)
         if isinstance(self.sampler, ContainerStream):
-            self._passes.begin()
+            self._items.begin_pass()
             self.sampler.start_at(start)
         else:
             self.sampler.start = start
