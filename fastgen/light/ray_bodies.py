@@ -20,8 +20,8 @@ LIFT_MM = 1.0
 """Distance from a surface at which rays from it start."""
 
 _APART_MM = 8.0
-"""Largest distance of a visible point from its surface, see RayBodies.settled. Lens distortion moves
-only the corners of triangles, so points of far walls are up to 5 mm off."""
+"""Largest distance of a visible point from its surface, see RayBodies.settled. A lens distorts only
+the corners of triangles, so points of far walls are up to 5 mm off."""
 
 
 def check_rays() -> None:
