@@ -137,6 +137,14 @@ def visible_share(values: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.asarray(1 - rim * rim, np.float32)
 
 
+def narrowed_cones(cones: NDArray[np.uint8], left: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Return cones uint8 [V, 3], see `encoded_cones`, of which only a share [V] is left."""
+    toward, length = _decoded(cones)
+    rim = np.sqrt(1 - left * visible_share(cones))
+    scale = 127 * (1 - rim / 2) / length
+    return np.asarray(np.rint(128 + toward * scale).T, np.uint8)
+
+
 @dataclass(frozen=True)
 class Sky:
     """Light of an environment, turned by yaw_deg."""

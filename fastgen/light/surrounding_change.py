@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.geometry.mesh import Mesh
-from fastgen.light.sky_visibility import Sky, SkyVisibility, visible_share
+from fastgen.light.sky_visibility import Sky, SkyVisibility, narrowed_cones, visible_share
 
 LIFT_MM = 5.0
 """Distance of the points from the box."""
@@ -73,6 +73,10 @@ class SurroundingLight:
         found = visibility.vertex_bytes(sky, self.vertex_light(values, light, mesh))
         nearest = np.take_along_axis(corner, weight.argmax(axis=0)[None], axis=0)[0]
         found[:, 8:] &= self.open_bits.take(nearest, axis=0)
+        # a roof under another container mirrors no sky; walls of an aisle mirror its open end
+        up = np.flatnonzero(mesh.normals[:, 2] > 0.5)
+        left = self.sky.mean(axis=1).take(nearest[up])
+        found[up, :3] = narrowed_cones(found[up, :3], left)
         return found
 
     def vertex_light(
