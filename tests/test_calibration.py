@@ -21,7 +21,7 @@ FISHEYE = np.array([-0.02, 0.003, -0.001, 0.0002])
 RIG = {"face": "front", "distance_mm": [5200, 6000], "roll_deg": 3, "azimuth_deg": 8}
 
 
-def opencv_file(path, coefficients, fisheye=False):
+def opencv_file(path, coefficients, fisheye=False, shape=(-1, 1)):
     """Write a calibration as OpenCV's calibration samples do."""
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     storage.write("calibration_time", "Fri Nov 27 2026")
@@ -29,7 +29,7 @@ def opencv_file(path, coefficients, fisheye=False):
     storage.write("image_height", 480)
     storage.write("fisheye_model", int(fisheye))
     storage.write("camera_matrix", MATRIX)
-    storage.write("distortion_coefficients", coefficients.reshape(-1, 1))
+    storage.write("distortion_coefficients", coefficients.reshape(shape))
     storage.release()
 
 
@@ -101,6 +101,23 @@ def test_a_calibration_file_projects_as_opencv(write, coefficients, fisheye, tmp
     np.testing.assert_allclose(halved, wanted / 2, atol=1e-5)
     square = view_of(camera, (640, 640)).project(points)[0][inside]
     np.testing.assert_allclose(square, wanted + (0, 80), atol=1e-5)
+
+
+@pytest.mark.parametrize("shape", [(5,), (5, 1), (1, 5), (1, 1, 5), (5, 1, 1)])
+@pytest.mark.parametrize("kind", ["yaml", "yml", "json"])
+def test_a_file_of_opencv_is_read_whatever_the_shape_of_its_coefficients(kind, shape, tmp_path):
+    file = tmp_path / f"camera.{kind}"
+    opencv_file(file, BARREL, shape=shape)
+    camera = Config.from_values({"cameras": {"G": {**RIG, "calibration": str(file)}}}).cameras["G"]
+    found = [getattr(camera.lens, name)[0] for name in ("k1", "k2", "p1", "p2", "k3")]
+    np.testing.assert_allclose(found, BARREL, rtol=1e-15)
+
+
+def test_an_xml_file_of_opencv_is_refused_with_the_types_that_can_be_read(tmp_path):
+    file = tmp_path / "camera.xml"
+    opencv_file(file, BARREL)
+    with pytest.raises(ConfigError, match=r"camera.xml: is an XML file; write .*as .yaml or .json"):
+        Config.from_values({"cameras": {"G": {**RIG, "calibration": str(file)}}})
 
 
 @pytest.mark.parametrize(("coefficients", "fisheye"), CASES, ids=IDS)

@@ -224,8 +224,11 @@ def _calibration(path: Path) -> Mapping[str, Any]:
     except (OSError, ValueError) as error:
         words = error.strerror if isinstance(error, OSError) else "not a text file"
         raise ConfigError(f"cannot be read ({words})") from None
-    # OpenCV's header and tag are not of YAML's form
-    text = re.sub(r"\A%YAML:1\.0[^\n]*\n", "", text).replace("!!opencv-matrix", "")
+    if text.startswith("<?xml"):
+        raise ConfigError("is an XML file; write the calibration as .yaml or .json instead")
+    # OpenCV's header and tags are not of YAML's form; OpenCV 5 has a tag for other than 2 axes
+    text = re.sub(r"\A%YAML:1\.0[^\n]*\n", "", text)
+    text = re.sub(r"!!opencv-(?:nd-)?matrix\b", "", text)
     try:
         data = loaded(text)
     except yaml.YAMLError as error:
