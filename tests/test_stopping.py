@@ -1,6 +1,8 @@
 """Runs stopped by signals: they end quietly and at once, and can be resumed."""
 
+import argparse
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +16,21 @@ from fastgen.cli.main import main
 from fastgen.dataset.workers import undisturbed
 
 ARGUMENTS = ["--images", "8", "--size", "64x64", "--cameras", "A", "--workers", "2"]
-STOPPED = "fastgen: stopped; run the same command again to go on"
+STOPPED = "fastgen: stopped"
+RESUMABLE = f"{STOPPED}; run the same command again to go on"
+
+COMMANDS = {  # with the arguments that each requires
+    "generate": ["out", "--images", "1"],
+    "fit": ["photos"],
+    "show": ["--index", "0", "-o", "0.png"],
+    "export": ["--index", "0", "-o", "0.glb"],
+    "stats": ["out"],
+    "report": ["out"],
+    "verify": ["out"],
+    "merge": ["one", "other", "out"],
+    "completion": ["bash"],
+    **{name: [] for name in ("config", "presets", "studio", "doctor")},
+}
 
 
 def begun(out, images="900"):
@@ -65,7 +81,7 @@ def test_sigterm_stops_a_run_as_ctrl_c_does(tmp_path, moment):
     error = process.communicate(timeout=300)[1]
     assert process.returncode == 128 + signal.SIGTERM
     assert "Traceback" not in error
-    assert error.splitlines()[-1] == STOPPED
+    assert error.splitlines()[-1] == RESUMABLE
     assert not [p for p in out.iterdir() if p.name.startswith(".")]
     wait_for(lambda: gone(family))
 
@@ -110,6 +126,32 @@ def test_a_run_stopped_by_sigterm_can_be_resumed(tmp_path):
     assert main(["generate", str(out), *ARGUMENTS, "--images", "16"]) == 0
     assert signal.getsignal(signal.SIGTERM) == before
     assert main(["verify", str(out)]) == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("command", [*COMMANDS, "verify --repair"])
+def test_only_a_command_that_continues_its_work_asks_to_be_run_again(
+    command, number, capsys, monkeypatch
+):
+    name, *more = command.split()
+    plain = argparse.ArgumentParser.parse_args
+
+    def with_a_signal(*arguments):
+        options = plain(*arguments)
+        options.run = lambda _: signal.raise_signal(number)
+        return options
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", with_a_signal)
+    assert main([name, *COMMANDS[name], *more]) == 128 + number
+    resumes = command in ("generate", "verify --repair")
+    assert capsys.readouterr().err == (f"{RESUMABLE}\n" if resumes else f"{STOPPED}\n")
+
+
+def test_every_command_is_stopped_by_a_test(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    listed = re.findall(r"^    (\w+)\b", capsys.readouterr().out, re.MULTILINE)
+    assert set(listed) == {*COMMANDS}
 
 
 LOADING = """

@@ -152,7 +152,7 @@ def add_generate(commands: Any) -> None:
         "machine; all nodes must be able to write to OUT",
     )
     add_output(command)
-    command.set_defaults(run=_generate)
+    command.set_defaults(run=_generate, resumes=True)
 
 
 def add_merge(commands: Any) -> None:

@@ -44,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    options = argparse.Namespace()
     try:
         try:
             options = _parser().parse_args(arguments)
@@ -60,13 +61,18 @@ def _run(arguments: Sequence[str] | None) -> int:
     except MemoryError:
         return _refused("out of memory; use fewer workers or a smaller size")
     except KeyboardInterrupt as stop:
-        say(STOPPED)
+        say(f"{STOPPED}; run the same command again to go on" if _resumes(options) else STOPPED)
         return 128 + (signal.SIGTERM if isinstance(stop, Terminated) else signal.SIGINT)
     except Exception as error:
         say("".join(traceback.format_exception(error)).rstrip())
         say(one_line(f"fastgen: {error!r} (this is a bug in fastgen: please report it)"))
         return _BUG
     return code
+
+
+def _resumes(options: argparse.Namespace) -> bool:
+    """Return whether the command, if run again, continues the work of a run that was stopped."""
+    return getattr(options, "resumes", False) or getattr(options, "repair", False)
 
 
 def _refused(words: str) -> int:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from types import FrameType
 from typing import NoReturn
 
-STOPPED = "fastgen: stopped; run the same command again to go on"
+STOPPED = "fastgen: stopped"
 
 
 class Terminated(KeyboardInterrupt):
