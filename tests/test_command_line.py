@@ -134,6 +134,17 @@ def test_odd_values_of_every_option_get_one_clear_line_and_code_2(
     assert not list(tmp_path.iterdir())
 
 
+def test_descriptions_of_commands_keep_the_capitals_of_their_help():
+    (subparsers,) = (a for a in _parser()._actions if isinstance(a.choices, dict))
+    helps = {each.dest: each.help for each in subparsers._choices_actions}
+    described = {name: each.description for name, each in subparsers.choices.items()}
+    same = [name for name in helps if described[name].lower() == f"{helps[name].lower()}."]
+    assert {"doctor", "report"} <= {*same}
+    for name in same:
+        assert described[name][1:] == f"{helps[name][1:]}."
+        assert described[name][0] == helps[name][0].upper()
+
+
 def test_the_options_with_values_are_found():
     found = set(options_with_values())
     assert {("generate", "--seed"), ("show", "-o"), ("fit", "--budget")} <= found

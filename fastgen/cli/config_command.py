@@ -4,7 +4,7 @@ import argparse
 import json
 from typing import Any
 
-from fastgen.cli.options import add_config, add_hdri, add_size, config_of, size_of
+from fastgen.cli.options import add_config, add_hdri, add_size, config_of, sentence, size_of
 from fastgen.config.commented_yaml import as_yaml
 from fastgen.config.presets import preset_named, preset_names
 from fastgen.dataset.console import tell
@@ -36,7 +36,7 @@ def add_config_command(commands: Any) -> None:
 def add_presets(commands: Any) -> None:
     """Add `fastgen presets`."""
     words = "list the presets of fastgen and of installed packages"
-    command = commands.add_parser("presets", help=words, description=f"{words.capitalize()}.")
+    command = commands.add_parser("presets", help=words, description=sentence(words))
     command.set_defaults(run=_presets)
 
 

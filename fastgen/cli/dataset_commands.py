@@ -15,6 +15,7 @@ from fastgen.cli.options import (
     config_of,
     output_file,
     render_settings,
+    sentence,
     summarize,
 )
 from fastgen.dataset.addresses import place_of
@@ -171,7 +172,7 @@ def add_merge(commands: Any) -> None:
 def add_stats(commands: Any) -> None:
     """Add `fastgen stats`."""
     words = "print how many images and labels a dataset has, by class and split"
-    command = commands.add_parser("stats", help=words, description=f"{words.capitalize()}.")
+    command = commands.add_parser("stats", help=words, description=sentence(words))
     command.add_argument("out", type=_place, metavar="OUT", help=_OUT)
     command.add_argument("--json", action="store_true", help="print the numbers as JSON")
     command.set_defaults(run=_stats)
@@ -180,7 +181,7 @@ def add_stats(commands: Any) -> None:
 def add_report(commands: Any) -> None:
     """Add `fastgen report`."""
     words = "write a page of HTML that shows what a dataset holds, with advice"
-    command = commands.add_parser("report", help=words, description=f"{words.capitalize()}.")
+    command = commands.add_parser("report", help=words, description=sentence(words))
     command.add_argument("out", type=_place, metavar="OUT", help=_OUT)
     command.add_argument(
         "-o",

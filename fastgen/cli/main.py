@@ -17,7 +17,7 @@ from fastgen.cli.dataset_commands import (
     add_verify,
 )
 from fastgen.cli.fit_command import add_fit
-from fastgen.cli.options import log_level
+from fastgen.cli.options import log_level, sentence
 from fastgen.cli.scene_commands import add_export, add_show
 from fastgen.cli.stopping import STOPPED, Terminated, interrupted_by_sigterm
 from fastgen.cli.studio_command import add_studio
@@ -109,7 +109,7 @@ def _parser() -> argparse.ArgumentParser:
         add(commands)
     add_completion(commands, _parser)
     words = "test the OpenGL backends and devices of this machine"
-    command = commands.add_parser("doctor", help=words, description=f"{words.capitalize()}.")
+    command = commands.add_parser("doctor", help=words, description=sentence(words))
     command.set_defaults(run=_doctor)
     return parser
 

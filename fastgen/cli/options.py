@@ -20,6 +20,11 @@ from fastgen.validation import check_known
 LOG_LEVELS = ("info", "warning", "error")
 
 
+def sentence(words: str) -> str:
+    """Return the help of a command as a sentence; names such as HTML keep their capitals."""
+    return f"{words[0].upper()}{words[1:]}."
+
+
 def add_config(command: argparse.ArgumentParser) -> None:
     """Add --preset, --config and --set, which `config_of` reads."""
     group = command.add_argument_group("scenes")
