@@ -1,5 +1,8 @@
 """Fits to photographs: statistics by independent formulas, and recovery of known cameras."""
 
+import itertools
+import re
+import time
 from concurrent.futures import ThreadPoolExecutor
 from math import erf, sqrt
 
@@ -182,8 +185,8 @@ def test_a_fit_recovers_the_camera_of_photographs(generators):
     whole = {"damage": {"probability": 0.0}, "environment": {"names": ["park", "city"]}}
     config = Config.from_values({**whole, "sensor": sensor})
     generator = generators(config, seed=3, size=(160, 120), quality="draft")
-    frames = linear_frames(generator, 8)
-    others = linear_frames(generator, 8, first=100)
+    frames = list(linear_frames(generator, 8))
+    others = list(linear_frames(generator, 8, first=100))
     with ThreadPoolExecutor(2) as workers:
         taken = from_plain(SensorConfig, STRONG, base=SensorConfig())
         real = statistics_of_frames([*frames, *others], taken, workers)
@@ -224,6 +227,37 @@ def test_a_proposal_changes_paints_light_and_camera(tmp_path):
     few = propose(photographs[:3], preset, effort, seed=2)
     assert not {"surface", "environment"} & set(few.values)
     assert "3 photographs are too few for weights" in few.notes[0]
+
+
+STAGES = [
+    "photographs",
+    "pictures of the preset",
+    "scenes for the search",
+    "trials",
+    "pictures of the proposal",
+]
+
+
+def test_a_log_of_the_command_has_plain_lines_about_each_stage(tmp_path, capsys, monkeypatch):
+    def least(trials):
+        return Effort(trials, frames=4, checked=3, size=(96, 72), quality="draft")
+
+    monkeypatch.setattr("fastgen.fit.proposal.Effort", least)
+    now = itertools.count(0, 20)  # each look at the clock is later than the next line in a log
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(now)))
+    folder, file = photographs_in(tmp_path / "photos", 3), tmp_path / "port.yaml"
+    assert main(["fit", str(folder), "-o", str(file), "--budget", "0.4", "--preset", "yard"]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert all(line.isprintable() for line in lines)
+    counted = [re.match(r"\[[#.]{28}\] (\d+)/(\d+) ([^,]+)", line).groups() for line in lines]
+    assert list(dict.fromkeys(unit for *_, unit in counted)) == STAGES
+    for stage, total in zip(STAGES, (3, 3, 4, 24, 3), strict=True):
+        done = [int(count) for count, all_, unit in counted if unit == stage]
+        assert done == sorted(done)
+        assert {int(all_) for _, all_, unit in counted if unit == stage} == {total}
+        assert len(done) > 1
+        assert done[-1] == total
+    assert any(re.search(r" 12/24 trials, .*smallest gap \d", line) for line in lines)
 
 
 def photographs_in(folder, count, size=(96, 80)):

@@ -1,14 +1,14 @@
 """`fastgen fit`: propose a configuration for a folder of photographs."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
 from fastgen.cli.options import add_seed, output_file
 from fastgen.config.config import Config
 from fastgen.config.presets import PRESETS
-from fastgen.dataset.console import say, tell
+from fastgen.dataset.console import tell
+from fastgen.dataset.progress import Progress
 from fastgen.errors import ConfigError, OutputError
 from fastgen.files.images import check_folder, write
 
@@ -62,6 +62,29 @@ def add_fit(commands: Any) -> None:
     command.set_defaults(run=_fit)
 
 
+class _Stages:
+    """Progress of a fit: a line for each stage, or in a log also one every 15 s."""
+
+    def __init__(self) -> None:
+        self._unit = ""
+        self._progress: Progress | None = None
+
+    def show(self, unit: str, done: int, total: int, remark: str) -> None:
+        """Show how many photographs, pictures, scenes or trials of a stage are done."""
+        if self._progress is None or unit != self._unit:
+            self.close()
+            self._unit, self._progress = unit, Progress(total, unit=unit)
+        if done:
+            self._progress.add(done - self._progress.made, remark)
+        else:
+            self._progress.note("starting")
+
+    def close(self) -> None:
+        """Draw the last state of the last stage."""
+        if self._progress is not None:
+            self._progress.close()
+
+
 def _fit(options: argparse.Namespace) -> int:
     # here because scipy.stats takes a second to import
     from fastgen.fit.boxes import read_box_heights
@@ -84,8 +107,11 @@ def _fit(options: argparse.Namespace) -> int:
     photographs = read_photographs(options.photos, options.longest)
     boxes = read_box_heights(options.photos, photographs)
     effort = Effort(max(round(TRIALS_PER_MINUTE * options.budget), 12))
-    shown = say if sys.stderr.isatty() else lambda words: None
-    proposal = propose(photographs, preset, effort, options.seed, boxes, shown)
+    stages = _Stages()
+    try:
+        proposal = propose(photographs, preset, effort, options.seed, boxes, stages.show)
+    finally:
+        stages.close()
     head = (
         f"Changes to --preset {options.preset}, fitted to {len(photographs)} photographs.\n"
         f"Mean gap {proposal.before.total:.2f} before and {proposal.after.total:.2f} after, in "

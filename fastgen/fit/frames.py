@@ -1,7 +1,7 @@
 """Linear light of rendered scenes, kept so that many cameras can be tried on it."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -100,8 +100,8 @@ def light_shares(config: Config, available: Mapping[str, float]) -> dict[str, fl
     return {light: share / total for light, share in sorted(shares.items())}
 
 
-def linear_frames(generator: Generator, count: int, first: int = 0) -> list[LinearFrame]:
-    """Render the linear light of scenes, equally many in each class of light.
+def linear_frames(generator: Generator, count: int, first: int = 0) -> Iterator[LinearFrame]:
+    """Yield the linear light of rendered scenes, equally many in each class of light.
 
     Args:
         generator: Its configuration, seed and size are those of the frames.
@@ -111,7 +111,6 @@ def linear_frames(generator: Generator, count: int, first: int = 0) -> list[Line
     config = generator.config
     shares = light_shares(config, generator.environments)
     weights = environment_weights(config, generator.environments)
-    found = []
     for k in range(count):
         light = list(shares)[k % len(shares)]
         only = {name: own if light_class(name) == light else 0.0 for name, own in weights.items()}
@@ -121,8 +120,7 @@ def linear_frames(generator: Generator, count: int, first: int = 0) -> list[Line
         cameras = scene.cameras
         # each camera meets each light, also if their numbers have a common factor
         camera = cameras[(k + k // math.lcm(len(shares), len(cameras))) % len(cameras)]
-        found.append(_linear_frame(generator, scene, camera, light))
-    return found
+        yield _linear_frame(generator, scene, camera, light)
 
 
 def _linear_frame(generator: Generator, scene: Scene, camera: Camera, light: str) -> LinearFrame:

@@ -1,8 +1,8 @@
 """Proposal of a configuration for a folder of photographs: measure, search, and check."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import yaml
@@ -33,6 +33,10 @@ _CHECKED_FROM = 1_000_000
 """First scene of the pictures that the gap is reported for; the search does not see them."""
 
 Array = NDArray[np.float64]
+OnStep = Callable[[str, int, int, str], None]
+"""Callback with the unit of a stage, the number done, the total, and a remark."""
+
+_Item = TypeVar("_Item")
 
 
 class Effort(NamedTuple):
@@ -87,7 +91,7 @@ def propose(
     effort: Effort,
     seed: int = 0,
     boxes: BoxHeights | None = None,
-    say: Callable[[str], None] = lambda words: None,
+    on_step: OnStep = lambda unit, done, total, remark: None,
 ) -> Proposal:
     """Return the changes to a preset that bring rendered pictures closest to photographs.
 
@@ -97,15 +101,17 @@ def propose(
         effort: Amount of rendering and searching.
         seed: Seed of scenes and optimizer; the same seed gives the same proposal.
         boxes: Heights of containers in photographs, if known.
-        say: Called with progress in words.
+        on_step: Called at the start of each stage, and after each of its photographs, pictures,
+            scenes or trials.
     """
     values: dict[str, Any] = {}
     reasons: dict[str, str] = {}
     notes: list[str] = []
     with ThreadPoolExecutor(usable_cpus()) as workers:
-        real = np.array(list(workers.map(lambda each: measured(each.pixels), photographs)))
-    say(f"{len(photographs)} photographs measured; rendering the preset")
-    ours = _pictures(preset, effort, seed)
+        statistics = workers.map(lambda each: measured(each.pixels), photographs)
+        real = np.array(_reported(statistics, "photographs", len(photographs), on_step))
+    unit = "pictures of the preset"
+    ours = _reported(_pictures(preset, effort, seed), unit, effort.checked, on_step)
     before = gap(real, np.array([measured(each) for each in ours]))
 
     many = len(photographs) >= FEWEST_FOR_WEIGHTS
@@ -122,11 +128,12 @@ def propose(
         values["cameras"], reasons["cameras"] = camera_distances(preset, boxes)
     base = Config.from_values(values, preset)
 
-    say(f"rendering {effort.frames} scenes for the search")
     with Generator(base, seed, size=effort.size, quality=effort.quality) as generator:
-        frames = linear_frames(generator, effort.frames)
+        rendered = linear_frames(generator, effort.frames)
+        frames = _reported(rendered, "scenes for the search", effort.frames, on_step)
         available = generator.environments
     shares = light_shares(base, available) if many else {}
+    on_step("trials", 0, effort.trials, "")
     found = search(
         real,
         frames,
@@ -134,7 +141,7 @@ def propose(
         shares,
         effort.trials,
         seed,
-        lambda done, best: say(f"trial {done} of {effort.trials}: gap {best:.3f}"),
+        lambda done, best: on_step("trials", done, effort.trials, f"smallest gap {best:.3f}"),
     )
     sensor = changes_at(found.point, base.sensor)
     if sensor:
@@ -143,19 +150,28 @@ def propose(
     if len(found.shares) > 1:
         _add_environments(values, reasons, base, available, found)
     config = Config.from_values(values, preset)
-    say("rendering the proposal")
-    after = gap(real, np.array([measured(each) for each in _pictures(config, effort, seed)]))
+    unit = "pictures of the proposal"
+    fitted = _reported(_pictures(config, effort, seed), unit, effort.checked, on_step)
+    after = gap(real, np.array([measured(each) for each in fitted]))
     return Proposal(values, reasons, before, after, notes)
 
 
-def _pictures(config: Config, effort: Effort, seed: int) -> list[Pixels]:
-    """Return pictures as a dataset would have them; cameras take turns."""
+def _reported(items: Iterable[_Item], unit: str, total: int, on_step: OnStep) -> list[_Item]:
+    """Return items as a list after reporting each as done."""
+    found = []
+    on_step(unit, 0, total, "")
+    for item in items:
+        found.append(item)
+        on_step(unit, len(found), total, "")
+    return found
+
+
+def _pictures(config: Config, effort: Effort, seed: int) -> Iterator[Pixels]:
+    """Yield pictures as a dataset would have them; cameras take turns."""
     cameras = list(config.cameras)
     with Generator(config, seed, size=effort.size, quality=effort.quality) as generator:
-        return [
-            generator.render(_CHECKED_FROM + k, cameras[k % len(cameras)]).image
-            for k in range(effort.checked)
-        ]
+        for k in range(effort.checked):
+            yield generator.render(_CHECKED_FROM + k, cameras[k % len(cameras)]).image
 
 
 def _add_environments(
