@@ -15,9 +15,6 @@ from fastgen.cli.main import main
 from fastgen.config.config import Config
 from fastgen.config.sensor import SensorConfig
 from fastgen.config.yaml_values import loaded
-from fastgen.errors import AssetError
-from fastgen.files.images import encode_picture
-from fastgen.fit.boxes import camera_distances, read_box_heights
 from fastgen.fit.edges import edge_blur_and_overshoot
 from fastgen.fit.frames import linear_frames, statistics_of_frames
 from fastgen.fit.gap import Gap, gap
@@ -29,6 +26,7 @@ from fastgen.fit.space import VARIABLES, changes_at, point_of, sensor_at
 from fastgen.fit.statistics import NAMES, STATISTICS, measured
 from fastgen.scene.optics import Sharpening
 from fastgen.validation import from_plain
+from tests.photographs import photographs_in
 
 
 def statistic(pixels, name):
@@ -260,34 +258,6 @@ def test_a_log_of_the_command_has_plain_lines_about_each_stage(tmp_path, capsys,
     assert any(re.search(r" 12/24 trials, .*smallest gap \d", line) for line in lines)
 
 
-def photographs_in(folder, count, size=(96, 80)):
-    folder.mkdir()
-    rng = np.random.default_rng(5)
-    for k in range(count):
-        pixels = rng.integers(0, 255, (size[1], size[0], 3), np.uint8)
-        (folder / f"{k}.png").write_bytes(encode_picture(pixels, ".png"))
-    return folder
-
-
-def test_large_photographs_are_scaled_down(tmp_path):
-    (photograph,) = read_photographs(photographs_in(tmp_path / "a", 1, (300, 100)), 150)
-    assert photograph.pixels.shape == (50, 150, 3)
-    assert photograph.size == (300, 100)
-
-
-def test_bad_photographs_are_named(tmp_path):
-    with pytest.raises(AssetError, match="no such folder"):
-        read_photographs(tmp_path / "none", 640)
-    with pytest.raises(AssetError, match="no photograph in this folder"):
-        read_photographs(tmp_path, 640)
-    small = photographs_in(tmp_path / "small", 1, (96, 20))
-    with pytest.raises(AssetError, match=r"0\.png: 96x20 pixels are too few"):
-        read_photographs(small, 640)
-    (tmp_path / "small/0.png").write_bytes(b"no picture")
-    with pytest.raises(AssetError, match=r"0\.png: cannot be read as a picture"):
-        read_photographs(small, 640)
-
-
 def test_the_command_refuses_before_it_renders(tmp_path, capsys):
     folder = photographs_in(tmp_path / "photos", 1)
     (tmp_path / "port.yaml").write_text("mine")
@@ -326,58 +296,6 @@ def test_a_file_that_cannot_be_written_is_refused_before_any_photograph_is_read(
     for path, message in ((tmp_path / "none" / "p.yaml", "no folder"), (tmp_path, "is a folder")):
         assert main(["fit", str(tmp_path / "photos"), "-o", str(path), "--force"]) != 0
         assert message in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("0.txt", b"\xe9 .5\n", r"0\.txt: not a YOLO file"),
-        ("0.txt", b"0 .5 .5 .4 -.5\n", r"0\.txt: line 1 is not a YOLO box"),
-        ("0.txt", b"0 50 40 30 30\n", r"0\.txt: line 1 is not a YOLO box"),
-        ("0.txt", b"0 .1 .2 .3 .4 .5 .6 .7\n", r"0\.txt: line 1 is not a YOLO box"),
-        ("0.txt", b"0 .5 nan .4 .5\n", r"0\.txt: line 1 is not a YOLO box"),
-        ("c.json", b"[" * 100000, r"c\.json: not a COCO file"),
-        *(
-            (
-                "c.json",
-                b'{"images":[{"id":1,"file_name":"0.jpg","height":%s}],"annotations":'
-                b'[{"image_id":1,"category_id":1,"bbox":[1,10,20,%s]}]}' % numbers,
-                r"c\.json: not a COCO file",
-            )
-            for numbers in ((b"0", b"30"), (b"9" * 400, b"30"), (b"100", b"-30"))
-        ),
-    ],
-)
-def test_files_of_boxes_that_cannot_be_used_are_named(tmp_path, name, content, message):
-    for number in range(2):
-        cv2.imwrite(str(tmp_path / f"{number}.jpg"), np.full((80, 100, 3), 90, np.uint8))
-    photographs = read_photographs(tmp_path, 640)
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(AssetError, match=message):
-        read_box_heights(tmp_path, photographs)
-
-
-def test_heights_of_boxes_give_distances(tmp_path):
-    folder = photographs_in(tmp_path / "photos", 3)
-    photographs = read_photographs(folder, 640)
-    (folder / "0.txt").write_text("0 0.5 0.5 0.9 0.5\n1 0.5 0.5 0.1 0.1\n")
-    (folder / "1.txt").write_text("0 0.5 0.25 0.9 0.5\n")  # cut off by the upper border
-    (folder / "boxes.json").write_text(
-        '{"images": [{"id": 7, "file_name": "2.png", "height": 80}], "annotations": ['
-        '{"image_id": 7, "category_id": 1, "bbox": [3, 10, 50, 40]}]}'
-    )
-    assert read_box_heights(folder, photographs) == pytest.approx([0.5, 0.5])
-    preset = Config.from_values({"container": {"kinds": {"20": 1}}}, Config.preset("gate"))
-    rig, words = camera_distances(preset, [0.5, 0.5])
-    rear = preset.cameras["rear"]
-    # a wall of 2591 mm has an image of half the sensor's height
-    expected = rear.focal_mm * 2591 / (0.5 * 27)
-    assert rig["rear"]["distance_mm"] == pytest.approx([expected, expected], abs=6)
-    assert rig["roof"] == {}
-    assert words == "boxes of 2 photographs are 50% to 50% of the image high"
-    (folder / "0.txt").write_text("container 0.5\n")
-    with pytest.raises(AssetError, match=r"0\.txt: line 1 is not a YOLO box"):
-        read_box_heights(folder, photographs)
 
 
 def test_every_statistic_has_a_cue_and_a_floor():

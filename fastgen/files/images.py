@@ -114,14 +114,20 @@ def decode(data: bytes) -> NDArray[Any]:
         Array [H, W] for grey images, else [H, W, C] in the order RGB or RGBA, of the file's depth.
 
     Raises:
-        ValueError: The file is damaged or not an image.
+        ValueError: The file is damaged, not an image, or too large.
     """
     import imageio.v3 as iio  # here because it takes 0.1 s and workers do not need it
+    from PIL.Image import DecompressionBombError
 
     try:
         return iio.imread(data, plugin="pillow")
     except (OSError, SyntaxError) as error:
-        raise ValueError(f"not a complete image ({error})") from None
+        if error.__cause__ is None:  # Pillow's own words
+            raise ValueError(f"not a complete image ({error})") from None
+        # the words of imageio are about its plugins
+        large = isinstance(error.__cause__, DecompressionBombError)
+        reason = "too many pixels" if large else "not an image of a known type, or cut short"
+        raise ValueError(reason) from None
 
 
 def check_folder(path: Path) -> None:

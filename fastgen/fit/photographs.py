@@ -1,5 +1,6 @@
 """Reading of a folder of photographs, and of the boxes beside them."""
 
+import warnings
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,7 +45,8 @@ def read_photographs(folder: Path, longest: int) -> list[Photograph]:
             than 64 pixels.
     """
     if not folder.is_dir():
-        raise AssetError(f"{folder}: no such folder; give one that contains photographs")
+        wrong = "is a file, not a folder" if folder.exists() else "no such folder"
+        raise AssetError(f"{folder}: {wrong}; give one that contains photographs")
     found = sorted(
         path
         for path in folder.iterdir()
@@ -59,7 +61,8 @@ def read_photographs(folder: Path, longest: int) -> list[Photograph]:
 
 def _read(path: Path, longest: int) -> Photograph:
     try:
-        pixels = _as_rgb(decode(read_plain(path, LARGEST_FILE)))
+        with warnings.catch_warnings(action="ignore"):  # of Pillow, about damage and large files
+            pixels = _as_rgb(decode(read_plain(path, LARGEST_FILE)))
     except (OSError, ValueError) as error:
         words = error.strerror if isinstance(error, OSError) else error
         raise AssetError(f"{path}: cannot be read as a picture ({words}); remove it") from None
