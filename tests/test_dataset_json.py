@@ -81,6 +81,42 @@ def test_shard_manifests_identify_the_run_if_dataset_json_does_not(dataset, copy
     assert {path: path.stat().st_mtime_ns for path in written} == written
 
 
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--shard", "2"], "shard_scenes was 1, is now 2"),
+        (["--seed", "4"], "seed was 3, is now 4"),
+        (["--size", "96x64"], "size was [64, 64], is now [96, 64]"),
+        (["--quality", "draft"], "quality was 'balanced', is now 'draft'"),
+        (["--cameras", "A"], "cameras was ['A', 'Cr'], is now ['A']"),
+        (["--shard", "2", "--seed", "4"], "seed was 3, is now 4; shard_scenes was 1, is now 2"),
+    ],
+)
+def test_shards_without_dataset_json_tell_which_options_to_repeat(copy, capsys, options, named):
+    (copy / "dataset.json").unlink()
+    before = content(copy)
+    assert run(copy, *options) == 2
+    error = capsys.readouterr().err
+    assert f"was made with other settings ({named}); to resume, repeat the old --" in error
+    assert all(option in error for option in options[::2])
+    assert content(copy) == before
+
+
+def test_the_number_of_scenes_in_a_single_shard_is_told_by_its_images(tmp_path, capsys):
+    assert run(tmp_path, "--shard", "3") == 0
+    (tmp_path / "dataset.json").unlink()
+    assert run(tmp_path) == 2
+    assert "(shard_scenes was 3, is now 1)" in capsys.readouterr().err
+
+
+def test_options_that_shards_do_not_tell_are_asked_for(copy, capsys):
+    (copy / "dataset.json").unlink()
+    for options in (["--set", "damage.probability=0.3"], ["--also", "voc"]):
+        assert run(copy, *options) == 2
+        error = capsys.readouterr().err
+        assert "repeat all options of that run, --shard and --hdri too, to resume" in error
+
+
 @pytest.mark.parametrize("shard", ["1", "2", "4"])
 def test_fewer_images_are_refused_without_dataset_json(tmp_path, capsys, shard):
     assert run(tmp_path, "--shard", shard) == 0

@@ -4,6 +4,7 @@ Shard manifests hold a hash of the same settings, so their run is known without 
 """
 
 import json
+import re
 import reprlib
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -13,6 +14,7 @@ from fastgen.dataset.manifest_types import Shard, parsed_json, unfit, unfit_fini
 from fastgen.dataset.seal import digest, is_sealed
 from fastgen.dataset.storage import Storage, UnreadableError
 from fastgen.errors import OutputError, shown_name
+from fastgen.render.settings import QUALITY
 
 MANIFEST = "dataset.json"
 
@@ -23,6 +25,12 @@ _MISSING = object()
 
 _SHOWN = 10
 """Number of differing settings that an error message lists with their values."""
+
+_LOOKED_AT = 100
+"""Number of shards whose images are looked at to find out settings."""
+
+_STEM = re.compile("(?:s([0-9]{1,18})_)?([0-9]{6,18})_(.+)")
+"""Stem of an image; its groups are the seed, the scene's index and the camera."""
 
 _OPTIONS = {
     "format": ("--format",),
@@ -80,15 +88,43 @@ def existing(storage: Storage, job: Job, settings: Mapping[str, Any]) -> dict[st
     if found is not None and found.keys() >= settings.keys():
         raise OutputError(_differ_message(job, settings, found))
     if made_with:
+        for old in _likely_settings(storage, settings):
+            if made_with == {digest(unsealed(old))}:
+                raise OutputError(_differ_message(job, settings, old))
         raise OutputError(
-            f"{job.out}: {problem}, and its shards were made with other settings; "
-            "repeat those, --hdri too, to resume, or give another folder"
+            f"{job.out}: {problem}, and its shards were made with other settings; repeat all "
+            "options of that run, --shard and --hdri too, to resume, or give another folder"
         )
     if any(not name.startswith(".") for name in storage.names()):
         raise OutputError(
             f"{job.out}: holds something else ({problem}); give an empty or new place"
         )
     return None
+
+
+def _likely_settings(storage: Storage, settings: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield settings with the seed, size, cameras and scenes per shard that shards show.
+
+    The other settings are as given, except the quality, which can be any.
+    """
+    manifests = (read_manifest(storage, shard) for shard in shard_numbers(storage)[:_LOOKED_AT])
+    records = [(each["shard"], record) for each in manifests if each for record in each["records"]]
+    named = [(shard, record, _STEM.fullmatch(record["stem"])) for shard, record in records]
+    images = [(shard, int(stem[2]), stem[3]) for shard, _, stem in named if stem]
+    if not images:
+        return
+    seeds = [int(stem[1]) for *_, stem in named if stem and stem[1]]
+    least = max(scene // (shard + 1) + 1 for shard, scene, _ in images)
+    most = min((scene // shard for shard, scene, _ in images if shard), default=least)
+    old = {
+        **settings,
+        "seed": seeds[0] if seeds else settings["seed"],
+        "size": records[0][1]["size"],
+        "cameras": list(dict.fromkeys(camera for *_, camera in images)),
+    }
+    for scenes in sorted({settings["shard_scenes"], least, most}):
+        for quality in QUALITY:
+            yield {**old, "shard_scenes": scenes, "quality": quality}
 
 
 def shard_numbers(storage: Storage) -> list[int]:
