@@ -85,6 +85,17 @@ def test_locate_refuses_positions_that_are_no_whole_numbers(position):
             "curriculum: epoch 0 changes which classes there are; list the same last kind in",
         ),
         (
+            {"curriculum": lambda epoch: {"split": {"train": 0.5, "val": 0.5, "test": 0.0}}},
+            "curriculum: epoch 0 changes split; leave it, because",
+        ),
+        (
+            {
+                "config": Config.from_values({"split": {"train": 1.0, "val": 0.0, "test": 0.0}}),
+                "curriculum": lambda epoch: Config.preset(),
+            },
+            "curriculum: epoch 0 changes split; leave it, because",
+        ),
+        (
             {"split": "val", "config": Config.from_values({"split": {"val": 0.0}})},
             "split: config.split gives val no scenes",
         ),
@@ -272,6 +283,15 @@ def test_a_foreign_value_anywhere_in_a_state_is_refused_and_changes_nothing(valu
         assert len(str(caught.value)) < 300, path
     assert loader.state_dict() == state
     assert len(called) < 100  # not once for each epoch that a state names
+
+
+def test_a_curriculum_may_repeat_the_split():
+    config = Config.from_values({"split": {"train": 0.5, "val": 0.5, "test": 0.0}})
+    for taught in (lambda epoch: config, lambda epoch: {"split": config.to_plain()["split"]}):
+        data = dataset_of(config=config, curriculum=taught, split="val")
+        data.set_epoch(1)
+        assert data.epoch == 1
+        data.close()
 
 
 @pytest.mark.parametrize("position", ["a", 1.5, None])

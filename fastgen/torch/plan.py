@@ -190,6 +190,11 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
             f"curriculum: epoch {epoch} changes which classes there are; list the "
             "same last kind in damage.kinds of every epoch, in the order of the classes"
         )
+    if made.split != base.split:
+        raise ConfigError(
+            f"curriculum: epoch {epoch} changes split; leave it, because a scene is always in the "
+            "same split"
+        )
     if list(made.cameras) != list(base.cameras):
         raise ConfigError(f"curriculum: epoch {epoch} changes which cameras there are; keep them")
     return made
