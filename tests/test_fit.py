@@ -259,7 +259,7 @@ def test_a_log_of_the_command_has_plain_lines_about_each_stage(tmp_path, capsys,
 
 
 def test_the_command_refuses_before_it_renders(tmp_path, capsys):
-    folder = photographs_in(tmp_path / "photos", 1)
+    folder = photographs_in(tmp_path / "photos", 2)
     (tmp_path / "port.yaml").write_text("mine")
     for arguments, words in (
         ([], "port.yaml: exists; give another name with -o, or --force"),
@@ -269,6 +269,10 @@ def test_the_command_refuses_before_it_renders(tmp_path, capsys):
     ):
         assert main(["fit", str(folder), "-o", str(tmp_path / "port.yaml"), *arguments]) == 2
         assert words in capsys.readouterr().err
+    assert main(["fit", str(folder), "-o", str(tmp_path / "port.yaml"), "--force"]) == 2
+    assert capsys.readouterr().err == (
+        "fastgen: photographs: 2 cannot be compared with renders; give at least 3, or better 20\n"
+    )
     assert (tmp_path / "port.yaml").read_text() == "mine"
 
 

@@ -11,7 +11,7 @@ from fastgen.fit.statistics import NAMES, STATISTICS
 
 Array = NDArray[np.float64]
 
-_FEWEST = 3
+FEWEST = 3
 """Pictures that must show a property before it is compared."""
 
 
@@ -45,7 +45,7 @@ def gap(photographs: Array, renders: Array, weights: Array | None = None) -> Gap
     for k, name in enumerate(NAMES):
         theirs, ours = np.isfinite(photographs[:, k]), np.isfinite(renders[:, k])
         frequency = np.ones(ours.sum()) if weights is None else weights[ours]
-        if min(theirs.sum(), ours.sum()) < _FEWEST or not frequency.sum():
+        if min(theirs.sum(), ours.sum()) < FEWEST or not frequency.sum():
             continue
         real = photographs[theirs, k]
         spread = max(float(real.std()), STATISTICS[name].floor)

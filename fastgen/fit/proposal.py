@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from fastgen.config.config import Config
 from fastgen.config.yaml_values import Dumper
 from fastgen.cpus import usable_cpus
+from fastgen.errors import AssetError
 from fastgen.fit.boxes import BoxHeights, camera_distances
 from fastgen.fit.frames import light_class, light_shares, linear_frames
-from fastgen.fit.gap import Gap, gap
+from fastgen.fit.gap import FEWEST, Gap, gap
 from fastgen.fit.paints import paint_weights
 from fastgen.fit.photographs import Photograph
 from fastgen.fit.search import Found, search
@@ -103,7 +104,15 @@ def propose(
         boxes: Heights of containers in photographs, if known.
         on_step: Called at the start of each stage, and after each of its photographs, pictures,
             scenes or trials.
+
+    Raises:
+        AssetError: There are too few photographs.
     """
+    if len(photographs) < FEWEST:
+        raise AssetError(
+            f"photographs: {len(photographs)} cannot be compared with renders; give at least "
+            f"{FEWEST}, or better 20"
+        )
     values: dict[str, Any] = {}
     reasons: dict[str, str] = {}
     notes: list[str] = []
