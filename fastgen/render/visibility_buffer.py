@@ -21,9 +21,7 @@ _OUT_OF_REACH_MM = 1e6
 
 _STEP_ROWS = 240
 """Number of rows by which textures grow. No multiple is a power of two, see textures.data_texture.
-
-The buffer with more samples, which `draft` uses for cables and distant containers only, rarely
-needs the rows near the lower edge of the image."""
+"""
 
 
 class VisibilityBuffer:
@@ -32,7 +30,7 @@ class VisibilityBuffer:
     They hold surface id, atlas position, depth, sky visibility and the light of each sample, and
     for damaged scenes the rest position. A holed scene has a second, mirrored view below the first
     one: what holes reveal of the interior. Images of a size share the textures, which grow when a
-    scene needs more, because a driver may keep all of a texture in memory.
+    scene needs more rows, because a driver may keep all of a texture in memory.
 
     Attributes:
         per_axis: Samples per pixel along each axis.
@@ -40,13 +38,17 @@ class VisibilityBuffer:
         to_clip: Matrix [2, 2] from the image's clip space to the buffer's, see SampleLattice.
     """
 
-    def __init__(self, gl: GLContext, size: tuple[int, int], samples_per_axis: int) -> None:
+    def __init__(
+        self, gl: GLContext, size: tuple[int, int], samples_per_axis: int, part: bool = False
+    ) -> None:
         """Prepare the buffer of (width, height) = size images.
 
         Args:
             gl: Current context.
             size: Image size in pixels.
             samples_per_axis: As many as sample_lattice.fitting allows, or fewer.
+            part: Images use the buffer for some of their containers only, which rarely reach the
+                lower edge, so it begins with the rows that are needed.
         """
         self._ctx = gl.ctx
         self._size = size
@@ -57,7 +59,7 @@ class VisibilityBuffer:
         assert row is not None, "more samples than `fitting` allows"
         self.inner_row = row
         self.to_clip = self._lattice.to_clip(size)
-        self._rows = 0
+        self._rows, self._least_rows = 0, 0 if part else self._fine[1]
         self._owned: list[Any] = []
         self._rest: list[moderngl.Texture] = []
         self._viewport = gl.function(
@@ -99,8 +101,9 @@ class VisibilityBuffer:
             holes: Regions that `limit_inside` will name.
             over: The surfaces are drawn over an image, which has its sky already.
         """
-        self._make_room(damage, seen)
-        for box in (*map(self._texels, seen), *map(self._texels_inside, holes)):
+        read = [*map(self._texels, seen), *map(self._texels_inside, holes)]
+        self._make_room(damage, max((top + height for _, top, _, height in read), default=1))
+        for box in read:
             self._clear(self._keys, box, NUMBERS, 0)
         # with single samples the depth separates sky from surfaces, see ImageTargets.begin
         outer = [None] if self.per_axis == 1 and not over else seen
@@ -123,14 +126,9 @@ class VisibilityBuffer:
         target.use()
         target.viewport = (0, 0, *self._fine)
 
-    def _make_room(self, damage: str, seen: Sequence[Region | None]) -> None:
-        rows = self._fine[1]
-        if damage == "holed":
-            rows += self.inner_row
-        elif self.per_axis > 1:  # the background pass needs all rows of single samples
-            _, tops, _, heights = zip((0, 0, 0, 0), *map(self._texels, seen), strict=True)
-            lowest = max(top + height for top, height in zip(tops, heights, strict=True))
-            rows = min(-(-max(lowest, 1) // _STEP_ROWS) * _STEP_ROWS, rows)
+    def _make_room(self, damage: str, rows: int) -> None:
+        most = self._fine[1] + (self.inner_row if damage == "holed" else 0)
+        rows = max(min(-(-rows // _STEP_ROWS) * _STEP_ROWS, most), self._least_rows)
         if rows > self._rows:
             self.release()
             self._rows = rows
