@@ -10,10 +10,9 @@ def main() -> int:
     with ended_at_once():
         local = not {"-h", "--help", "--ray"}.intersection(sys.argv)
         if sys.argv[1:2] == ["generate"] and local:
-            # it imports the package while this process does
-            from fastgen.dataset.workers import start_server
+            from fastgen.dataset.workers import fork_from_here
 
-            start_server()
+            fork_from_here()
         from fastgen.cli.main import main as run
     return run()
 

@@ -194,6 +194,7 @@ class Folder:
         path = self.root / LOCK
         with _named(path, "written"):
             stream = open_lock(path)
+        os.register_at_fork(after_in_child=stream.close)  # a worker must not hold the lock
         with stream:
             try:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -2,12 +2,14 @@
 
 Each process has its own pipe. A shared queue has a lock, which stays locked if its holder dies.
 
-Workers are forked from a server process that has imported the package, so they start at once and
-share the memory of its modules. The server opens no OpenGL context, because a child hangs if a
-context was opened before the fork.
+Workers are forked from a process that has imported the package, so they start at once and share
+the memory of its modules. That process has no other threads and no OpenGL context, because a child
+may hang otherwise. It is the process of the command itself, or for programs that call fastgen a
+server process.
 """
 
 import contextlib
+import importlib
 import multiprocessing
 import os
 import signal
@@ -20,7 +22,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import islice
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import ForkServerContext, SpawnContext
+from multiprocessing.context import ForkContext, ForkServerContext, SpawnContext
+from pathlib import Path
 from typing import Any
 
 from fastgen.errors import FastgenError, OutputError
@@ -47,7 +50,10 @@ OpenBLAS reads them when NumPy is imported, which is before any of our code runs
 """
 
 _WARM_START = "fastgen.dataset.warm_start"
-"""Module that the server imports."""
+"""Module that is imported before workers are forked."""
+
+_FORKING: set[int] = set()
+"""The ids of processes that workers may be forked from, see `fork_from_here`."""
 
 
 @contextlib.contextmanager
@@ -102,7 +108,6 @@ def _started_quietly() -> Iterator[None]:
     It reaches the whole process group, but the parent decides what happens. Children inherit the
     signal mask.
     """
-    resource_tracker.ensure_running()  # its start would lift the mask
     with undisturbed(), _set_variables(_one_matrix_thread()):
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
         try:
@@ -122,6 +127,7 @@ def start_server() -> bool:
         longer than about 75 characters or cannot be written.
     """
     paths = os.pathsep.join(os.path.abspath(path) for path in sys.path)
+    resource_tracker.ensure_running()  # its start would lift the signal mask of `_started_quietly`
     with _started_quietly(), _set_variables({"PYTHONSAFEPATH": "1", "PYTHONPATH": paths}):
         forkserver.set_forkserver_preload([_WARM_START])
         try:
@@ -129,6 +135,27 @@ def start_server() -> bool:
         except OSError:
             return False
     return True
+
+
+def fork_from_here() -> None:
+    """Let workers be forked from this process, which saves a server and its imports.
+
+    Call this before NumPy is imported. The process must not open OpenGL.
+    """
+    os.environ.update(_one_matrix_thread())
+    _FORKING.add(os.getpid())
+
+
+def _context() -> ForkContext | ForkServerContext | SpawnContext:
+    """Return how a worker starts."""
+    tasks = Path("/proc/self/task")
+    # object stores start threads, and other systems have no such folder
+    if os.getpid() in _FORKING and tasks.is_dir() and len(list(tasks.iterdir())) == 1:
+        importlib.import_module(_WARM_START)
+        return multiprocessing.get_context("fork")
+    if start_server():
+        return multiprocessing.get_context("forkserver")
+    return multiprocessing.get_context("spawn")
 
 
 class Waiting:
@@ -160,11 +187,7 @@ class _Worker:
     """One process, its current task, and the time of its last report."""
 
     def __init__(self, setup: Setup) -> None:
-        context: ForkServerContext | SpawnContext = (
-            multiprocessing.get_context("forkserver")
-            if start_server()
-            else multiprocessing.get_context("spawn")
-        )
+        context = _context()
         self.pipe, theirs = context.Pipe()
         arguments = theirs, setup, dict(os.environ)
         self.process = context.Process(target=_work, args=arguments, name=_NAME, daemon=True)
@@ -291,6 +314,8 @@ def _work(pipe: Connection, setup: Setup, environment: Mapping[str, str]) -> Non
     os.environ.clear()  # the server may have started with other variables
     os.environ.update(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if signal.getsignal(signal.SIGTERM) != signal.SIG_IGN:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # not the handler of a forked process
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     place = "start"
