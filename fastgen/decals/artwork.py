@@ -156,8 +156,8 @@ def art_levels() -> tuple[NDArray[np.uint8], ...]:
     Raises:
         AssetError: A file is missing or broken.
     """
-    digest = hashlib.sha256()
-    for path in _art_paths():
+    digest, paths = hashlib.sha256(), _art_paths()
+    for path in paths:
         digest.update(path.read_bytes() if path.exists() else b"")
 
     def make() -> dict[str, NDArray[np.uint8]]:
@@ -167,9 +167,7 @@ def art_levels() -> tuple[NDArray[np.uint8], ...]:
         return {f"level{i}": premultiplied(level) for i, level in enumerate(whole)}
 
     sizes = [ART_SIZE >> i for i in range(ART_SIZE.bit_length())]
-    layout = {
-        f"level{i}": f"uint8 {len(_art_paths())} {size} {size} 4" for i, size in enumerate(sizes)
-    }
+    layout = {f"level{i}": f"uint8 {len(paths)} {size} {size} 4" for i, size in enumerate(sizes)}
     stored = disk_cache.cached("art", VERSION, digest.hexdigest(), make, layout=layout)
     return tuple(stored.values())
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 import moderngl
 import numpy as np
 
+from fastgen.files import disk_cache
 from fastgen.render.gl import GLContext
 from fastgen.render.gl_enums import (
     GL_DEPTH_COMPONENT,
@@ -150,7 +151,9 @@ def noise_texture(gl: GLContext) -> moderngl.TextureArray:
 
     A driver may round up at each mip level that it computes, which adds up to three steps of 255.
     """
-    texture = levelled_texture(gl, noise_tiles().levels)
+    levels = noise_tiles().levels
+    texture = levelled_texture(gl, levels)
+    disk_cache.unload(levels[0])
     texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
     texture.repeat_x = texture.repeat_y = True
     return texture
