@@ -277,21 +277,25 @@ class SkyVisibilityProbe:
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0)
         # points outside the bounding box of the occluders may be hidden as well
         low, high = np.minimum(low, points_mm.min(axis=0)), np.maximum(high, points_mm.max(axis=0))
-        found = np.empty((len(points_mm), DIRECTIONS), bool)
-        corner = np.array(size) - 1
+        found = np.empty((DIRECTIONS, len(points_mm)), bool)
+        width, height = size
+        nearest = np.empty(width * height, np.float32)
         for i, toward in enumerate(sky_directions()):
             to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
             depths.draw([MapView(drawn, to_map, (0, 0, *size))])
-            nearest = np.frombuffer(depths.depth.read(alignment=1), np.float32)
-            at = points_mm @ to_map[:3, :3].T + to_map[:3, 3]
-            texel = np.clip((at[:, :2] + 1) / 2 * size, 0, corner).astype(np.int64)
+            depths.depth.read_into(nearest, alignment=1)
+            # one coordinate after the other: along a short last axis NumPy is several times slower
+            turned = np.ascontiguousarray((points_mm @ to_map[:3, :3].T).T)
+            x, y, z = turned + to_map[:3, 3, None]
+            column = np.clip((x + 1) / 2 * width, 0, width - 1).astype(np.int64)
+            row = np.clip((y + 1) / 2 * height, 0, height - 1).astype(np.int64)
             bias = _BIAS_MM * np.linalg.norm(to_map[2, :3])
-            before = nearest[texel[:, 1] * size[0] + texel[:, 0]] * 2 - 1
-            found[:, i] = at[:, 2] - bias <= before
+            before = nearest[row * width + column] * 2 - 1
+            found[i] = z - bias <= before
         depths.release()
         for body in drawn:
             body.release()
-        return found
+        return np.ascontiguousarray(found.T)
 
     def release(self) -> None:
         """Free the program."""
