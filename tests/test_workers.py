@@ -78,6 +78,16 @@ class TellsItsVariable:
         self._report("variable", os.environ.get("FASTGEN_TEST"))
 
 
+class TellsItsParent:
+    """Worker that reports the process that it was forked from."""
+
+    def __init__(self, report):
+        self._report = report
+
+    def __call__(self, _task):
+        self._report("parent", os.getppid())
+
+
 def heard_from(setup):
     """Return what a worker reports."""
     heard = []
@@ -103,6 +113,28 @@ def test_workers_start_no_matrix_threads_unless_the_user_asks_for_them(variables
         [sys.executable, "-c", code], env={**others, **variables}, capture_output=True, check=True
     )
     assert int(said.stdout) == threads
+
+
+FORKING = """
+import os, sys, threading
+from fastgen.dataset.workers import fork_from_here
+fork_from_here()
+from tests import test_workers as t
+if "thread" in sys.argv:
+    threading.Thread(target=threading.Event().wait, daemon=True).start()
+print(t.heard_from(t.TellsItsParent) == os.getpid())
+"""
+
+
+@pytest.mark.parametrize(("arguments", "here"), [([], "True"), (["thread"], "False")])
+def test_a_command_without_threads_forks_workers_from_its_own_process(arguments, here):
+    """The lock of a thread that a child lacks would stay locked."""
+    names = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS")
+    unset = {name: value for name, value in os.environ.items() if name not in names}
+    said = subprocess.run(
+        [sys.executable, "-c", FORKING, *arguments], env=unset, capture_output=True, check=True
+    )
+    assert said.stdout.decode().strip() == here
 
 
 SCRIPT = """
