@@ -133,7 +133,7 @@ def read(entry: Path, layout: Layout | None = None) -> Arrays | None:
         record = _mapped(entry)
         if record[_CHECKSUM][0] != _checksum(record):
             return None
-        unload(record)  # the checksum has read all pages, of which few may be needed
+        unload(record)  # the checksum has read all pages, but few may be needed
         names = [name for name in record.dtype.names or () if name != _CHECKSUM]
         arrays = {name: record[name][0, ...] for name in names}
         if layout is not None and not fits(arrays, layout):
