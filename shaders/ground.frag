@@ -15,6 +15,7 @@
 #include "ground_mirror.glsl"
 #include "ground_props.glsl"
 #include "ground_seen.glsl"
+#include "view_ray.glsl"
 
 layout(location = 0) out vec4 out_color;
 #if !GROUND_COARSE
@@ -93,7 +94,7 @@ vec4 seen_color(vec3 ray, out float depth) {
 void main() {
     float depth;
 #if GROUND_COARSE
-    out_color = seen_color(ground_ray(PIXEL_WIDTH * gl_FragCoord.xy), depth);
+    out_color = seen_color(view_ray(PIXEL_WIDTH * gl_FragCoord.xy), depth);
 #else
 #if GROUND_PROPS
     bool shows_props = tile_props().xy != uvec2(0u);
@@ -105,14 +106,14 @@ void main() {
     vec4 color = vec4(0.0);
     for (int i = 0; i < samples; ++i) {
         vec2 offset = shows_props ? vec2(i & 1, i >> 1) * 0.5 - 0.25 : vec2(0.0);
-        color += seen_color(ground_ray(gl_FragCoord.xy + offset), depth) / float(samples);
+        color += seen_color(view_ray(gl_FragCoord.xy + offset), depth) / float(samples);
     }
-    vec3 at, ray = ground_ray(gl_FragCoord.xy);
+    vec3 at, ray = view_ray(gl_FragCoord.xy);
     float share;
     depth = seen_plane(ray, at, share);
     depth = first_prop(ray, depth).depth;
 #else
-    vec4 color = seen_color(ground_ray(gl_FragCoord.xy), depth);
+    vec4 color = seen_color(view_ray(gl_FragCoord.xy), depth);
 #endif
     if (isinf(depth) && color.a == 0.0) discard;
     out_color = vec4(display_color(color.rgb), color.a);

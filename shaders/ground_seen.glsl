@@ -7,7 +7,7 @@
 #include "units.constants"
 #include "ground.block"
 #include "environment_map.glsl"
-#include "ground_ray.glsl"
+#include "plane_depth.glsl"
 
 uniform sampler2D obstacle_map;   // Share of containers and other obstacles; octahedral.
 

@@ -4,6 +4,7 @@
 #version 430 core
 #include "display_color.glsl"
 #include "ground_seen.glsl"
+#include "view_ray.glsl"
 
 uniform sampler2D ground_coarse;   // Exposed radiance, share that is not the panorama.
 
@@ -14,7 +15,7 @@ layout(location = 2) out float out_depth;
 void main() {
     vec3 at;
     float share;
-    out_depth = seen_plane(ground_ray(gl_FragCoord.xy), at, share);
+    out_depth = seen_plane(view_ray(gl_FragCoord.xy), at, share);
     if (isinf(out_depth)) discard;
     vec2 size = vec2(textureSize(ground_coarse, 0));
     vec4 color = textureLod(ground_coarse, 0.5 * gl_FragCoord.xy / size, 0.0);

@@ -4,6 +4,7 @@
 // Brown-Conrady and fisheye (Kannala-Brandt) models with OpenCV's coefficients. Far outside the image
 // the radial polynomial continues as a straight line.
 
+#include "variant.constants"
 #include "view.block"
 
 // Tangential distortion of the Brown-Conrady model.
@@ -38,7 +39,7 @@ float undistortion_ratio(vec2 seen) {
 
 // The tangential term depends on the undistorted point, which fixed-point iteration finds.
 vec2 undistorted(vec2 pixel) {
-    if (lens_model == 0.0) return pixel;
+#if LENS
     vec2 seen = (pixel - lens_center) / lens_focal;
     vec2 ideal = seen * undistortion_ratio(seen);
     int i = 0;
@@ -47,4 +48,7 @@ vec2 undistorted(vec2 pixel) {
         ideal = radial * undistortion_ratio(radial);
     } while (++i < lens_steps);
     return lens_center + lens_focal * ideal;
+#else
+    return pixel;
+#endif
 }

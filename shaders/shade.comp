@@ -12,6 +12,7 @@
 #include "pixel_list.glsl"
 #include "shade_single_surface.glsl"
 #include "shade_behind.glsl"
+#include "view_ray.glsl"
 #include "zone_color.glsl"
 #if WITH_HOLES
 #include "shade_hole.glsl"
@@ -90,7 +91,8 @@ void main() {
                 if (keys[i] == key) { weight += FILTER_WEIGHT[i]; of_side |= 1u << i; }
             of_part &= ~of_side;
             left &= ~of_side;
-            vec3 lit_color = zone_color(p, middle + side_offset, key, view);
+            ivec2 side_at = middle + side_offset;
+            vec3 lit_color = zone_color(p, side_at, key, view_ray(sample_position(side_at)), view);
 #if WITH_HOLES
             if (zone == HOLE_ZONE) {
                 Shaded through = shade_hole(middle + offset, key, behind);

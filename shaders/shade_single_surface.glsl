@@ -3,6 +3,7 @@
 #include "lookups.constants"
 #include "samples.constants"
 #include "shaded.glsl"
+#include "view_ray.glsl"
 #include "zone_color.glsl"
 #if LOOKUPS > 1
 #include "material_mean.glsl"
@@ -11,7 +12,8 @@
 Shaded shade_single_surface(ivec2 pixel) {
     ivec2 middle = center_texel(pixel);
     uint key = surface_id_at(middle);
-    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
+    vec3 ray = view_ray(vec2(pixel) + 0.5);
+    vec3 view = -normalize(ray);
     ZoneSample p = zone_sample(middle, key, view);
 #if LOOKUPS > 1
     // The surface is nearly flat between the centre sample and two other near samples, so the atlas
@@ -27,5 +29,5 @@ Shaded shade_single_surface(ivec2 pixel) {
         add_material(mean, p, id_zone(key), atlas_mm + mm_of_pixel * LOOKUP_PLACE[i], float(LOOKUPS));
     p.surface = mean;
 #endif
-    return Shaded(zone_color(p, middle, key, view), p.id, p.damage, p.depth, 1.0);
+    return Shaded(zone_color(p, middle, key, ray, view), p.id, p.damage, p.depth, 1.0);
 }

@@ -1,5 +1,6 @@
-// vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 view): light of a sample toward the eye.
-// p: Material of its zone. key: Surface id of the sample. view: Unit, toward the eye.
+// vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 ray, vec3 view): light of a sample toward
+// the eye. p: Material of its zone. key: Surface id of the sample. ray: View ray of the sample. view: Unit,
+// toward the eye.
 
 #include "materials.constants"
 #include "variant.constants"
@@ -9,7 +10,6 @@
 #include "sample_lattice.glsl"
 #include "sky_visibility_at.glsl"
 #include "surface_id.glsl"
-#include "view_ray.glsl"
 #include "visibility_buffer.glsl"
 #include "zone_sample.glsl"
 #if LIGHTS
@@ -19,7 +19,7 @@
 #include "traced_light.glsl"
 #endif
 
-vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 view) {
+vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 ray, vec3 view) {
     vec3 normal = id_normal(key);
     SkyVisibility sky = sky_visibility_at(sample_at, id_zone(key));
 #if WITH_DAMAGE
@@ -35,10 +35,9 @@ vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 view) {
     sky.occluder_albedo = mix(sky.occluder_albedo, above.rgb, overhead);
     vec4 light_seen = vec4(0.0);
     float depth = texelFetch(surface_depths, sample_at, 0).r;
-    vec2 position = sample_position(sample_at);
-    vec3 from_eye = depth * view_ray(position);
+    vec3 from_eye = depth * ray;
 #if TRACED
-    sky.traced = traced_light_at(position, key, from_eye, normal);
+    sky.traced = traced_light_at(sample_position(sample_at), key, from_eye, normal);
 #endif
 #if LIGHTS && LAYER == LAYER_ALL
     light_seen = light_visibility(p.surface.outward, from_eye, normal, depth * pixel_angle);

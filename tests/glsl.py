@@ -14,14 +14,17 @@ HEAD = "#version 430 core\n" + "".join(
 )
 
 
-def run(gl, body, inputs, textures=None, damage="undamaged", kinds=DRAWN_DAMAGE_CLASSES, lights=0):
-    """Return `vec4 f(vec4 x)`, defined in GLSL `body`, at each row of inputs [N, 4] as [N, 4]."""
+def run(gl, body, inputs, textures=None, damage="undamaged", kinds=DRAWN_DAMAGE_CLASSES, **others):
+    """Return `vec4 f(vec4 x)`, defined in GLSL `body`, at each row of inputs [N, 4] as [N, 4].
+
+    `others` are further arguments of ShaderVariant.
+    """
     ctx = gl.ctx
     main = (
         "\nuniform sampler2D inputs; layout(location = 0) out vec4 answer;\n"
         "void main() { answer = f(texelFetch(inputs, ivec2(gl_FragCoord.xy), 0)); }\n"
     )
-    variant = ShaderVariant(damage=damage, kinds=kinds, lights=lights)
+    variant = ShaderVariant(damage=damage, kinds=kinds, **others)
     program = ctx.program(
         vertex_shader=expand(shader_text("fullscreen.vert"), ShaderVariant()),
         fragment_shader=expand(HEAD + body + main, variant),

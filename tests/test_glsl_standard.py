@@ -126,7 +126,7 @@ def test_all_other_shaders_are_standard_glsl(programs):
         variant = ShaderVariant(lookups=2 - coarse, lights=MAX_LIGHTS if wet else 1, ground=ground)
         programs.add(("rectangles.vert", "ground.frag"), variant)
         programs.add(("fullscreen.vert", "ground_bake.frag"), variant)
-    lens = ShaderVariant(ground=GroundVariant(lens=True))
+    lens = ShaderVariant(lens=True)
     programs.add(("rectangles.vert", "ground_spread.frag"), lens)
     programs.add(("rectangles.vert", "background_by_ray.frag"), lens)
     assert refused(programs.folder) == ""

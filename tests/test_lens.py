@@ -120,7 +120,7 @@ def test_the_shader_removes_the_distortion(lens, focal_mm):
         )
         # no texture is wide enough for all pixels in one row
         rows = np.pad(seen, ((0, 0), (0, 2))).reshape(SIZE[1], SIZE[0], 4)
-        ideal = np.concatenate([run(gl, body, row) for row in rows[::8]])[:, :2]
+        ideal = np.concatenate([run(gl, body, row, lens=True) for row in rows[::8]])[:, :2]
         del kept
     there = view.distortion.apply((ideal - view.center_px) / view.focal_px) * view.focal_px
     expected = seen.reshape(SIZE[1], SIZE[0], 2)[::8].reshape(-1, 2)

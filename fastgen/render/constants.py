@@ -128,6 +128,7 @@ def _variant(v: ShaderVariant) -> Defines:
         "TRACED": int(v.traced),
         "RADIANCE": int(v.radiance),
         "OVER": int(v.over),
+        "LENS": int(v.lens),
     }
 
 
@@ -198,7 +199,6 @@ def _ground(v: ShaderVariant) -> Defines:
     return {
         **{f"GROUND_{kind.upper()}": int(kind == ground.kind) for kind in GROUNDS},
         "GROUND_BOXES": int(ground.boxes),
-        "GROUND_LENS": int(ground.lens),
         "GROUND_WET": int(ground.wet),
         "GROUND_PLANE": int(ground.plane),
         "GROUND_SHADOWS": int(ground.shadows),
@@ -298,7 +298,7 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
     },
     "noise": lambda _: {
         "NOISE_SIZE": f"{NOISE_SIZE:.1f}",
-        "NOISE_LEVELS": f"{NOISE_LEVELS:.1f}",
+        "NOISE_LEVELS": NOISE_LEVELS,
         "NORMAL_REACH": f"{NORMAL_REACH}",
         "SCRATCHED_SHARE": f"{noise_tiles().scratched:.6f}",
     },

@@ -106,7 +106,7 @@ def ground_plan(
     elif members:
         boxes = [member.box for member in members]
         dark = _any(tiles.touched(np.concatenate(_reaches(boxes, ground, view, lights))))
-    plain = GroundVariant(ground.kind, lens=view.distortion is not None, wet=wet)
+    plain = GroundVariant(ground.kind, wet=wet)
     near_bodies = replace(plain, boxes=bool(members), shadows=bool(props))
     alone = seen & ~(hidden | dark | shaded)
     plane = [GroundDraw(plain, alone), GroundDraw(near_bodies, seen & ~hidden & ~alone)]

@@ -279,6 +279,7 @@ class Renderer:
                 radiance=options.radiance,
                 without=self._without,
                 over=options.over,
+                lens=lens,
             ),
             textures={
                 **self._materials.of(decals, self._shapes.zone_table(container, spreader)),

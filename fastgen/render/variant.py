@@ -39,7 +39,6 @@ class GroundVariant:
     Attributes:
         kind: One of GROUNDS.
         boxes: Draw shadows and mirror images of containers.
-        lens: Undo lens distortion.
         wet: Draw wet ground.
         plane: Draw the plane, which blends into the panorama.
         shadows: Draw the shadows of props on the plane.
@@ -49,7 +48,6 @@ class GroundVariant:
 
     kind: str = "asphalt"
     boxes: bool = False
-    lens: bool = False
     wet: bool = False
     plane: bool = True
     shadows: bool = False
@@ -73,6 +71,7 @@ class ShaderVariant:
         radiance: Write exposed linear radiance instead of tone-mapped and encoded colour.
         without: Material layers of LAYERS to leave out.
         over: Draw over an image that already shows what lies behind, not over the sky.
+        lens: Undo lens distortion.
         ground: What the ground pass needs besides.
     """
 
@@ -87,6 +86,7 @@ class ShaderVariant:
     radiance: bool = False
     without: tuple[str, ...] = ()
     over: bool = False
+    lens: bool = False
     ground: GroundVariant = GroundVariant()
 
     @property

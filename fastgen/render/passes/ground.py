@@ -194,6 +194,7 @@ def _steps(plan: GroundPlan, inputs: DrawInputs) -> list[_Step]:
         layer=inputs.variant.layer,
         lights=max(inputs.variant.lights, 1),  # with light_count 0, the program skips its light
         radiance=inputs.variant.radiance,
+        lens=inputs.variant.lens,
     )
     steps = []
     props = plan.props.variant
@@ -201,10 +202,10 @@ def _steps(plan: GroundPlan, inputs: DrawInputs) -> list[_Step]:
         for each in plan.plane:
             shrunk = replace(variant, ground=replace(each.variant, coarse=True))
             steps.append(_Step("ground.frag", shrunk, each.tiles))
-        spread = replace(variant, lights=0, ground=GroundVariant(lens=props.lens))
+        spread = replace(variant, lights=0)
         seen = np.logical_or.reduce([each.tiles for each in plan.plane])
         steps.append(_Step("ground_spread.frag", spread, seen))
-        props = GroundVariant(boxes=props.boxes, lens=props.lens, props=True, plane=False)
+        props = GroundVariant(boxes=props.boxes, props=True, plane=False)
     else:
         for each in plan.plane:
             own = replace(variant, ground=each.variant)

@@ -34,7 +34,9 @@ class NormalsPass:
             if not regions:
                 continue
             traits = {"undamaged": "mixed", "damaged": "mixed_damaged", "holed": "holed"}
-            variant = replace(inputs.variant, damage=kind, pixel_class=traits[kind], lights=0)
+            variant = replace(
+                inputs.variant, damage=kind, pixel_class=traits[kind], lights=0, lens=False
+            )
             program = self._programs.get(("normals.comp",), variant)
             program.bind(inputs.textures)
             for x, y, width, height in regions:

@@ -49,6 +49,7 @@ class ShadingPass:
             inputs.variant,
             damage=inputs.variant.damage if damaged else "undamaged",
             lights=0,
+            lens=False,
         )
         program = self._programs.get(("classify.comp",), variant)
         program.bind(inputs.textures)
