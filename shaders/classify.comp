@@ -61,18 +61,99 @@ void write_labels(ivec2 pixel, uint key, float depth) {
     imageStore(depth_image, pixel, vec4(depth));
 }
 
-#if SAMPLES_PER_AXIS == 1
 // Offset of a bit's pixel in a 2x2 block.
 ivec2 in_block(int bit) { return ivec2(bit & 1, bit >> 1); }
 
-// Adds each pixel of a 2x2 block whose bit is set to a list.
-void list_each(uint list, ivec2 block, uint bits) {
-    if (bits == 0u) return;
-    uint at = listed(list, bitCount(bits));
-    for (int i = 0; i < 4; ++i)
-        if ((bits & 1u << i) != 0u) list_entries[at++] = list_entry(block + in_block(i));
+// Reserves room in a list for the pixels of a 2x2 block whose bits are set.
+uint room_for(uint bits, uint list) {
+    if (bits == 0u) return 0u;
+    return listed(list, bitCount(bits));
 }
 
+// Adds the pixels of a 2x2 block to lists. Bit i of each argument puts pixel i into the list of a class.
+void list_block(ivec2 block, uint plain, uint decals, uint mixed, uint mixed_decals, uint damaged,
+                uint mixed_damaged, uint holed) {
+    uint bits[7] = uint[7](plain, decals, mixed, mixed_decals, damaged, mixed_damaged, holed);
+    uint next[7] = uint[7](room_for(plain, LIST_PLAIN), room_for(decals, LIST_DECAL),
+                           room_for(mixed, LIST_MIXED), room_for(mixed_decals, LIST_MIXED_DECAL),
+                           room_for(damaged, LIST_DAMAGED), room_for(mixed_damaged, LIST_MIXED_DAMAGED),
+                           room_for(holed, LIST_HOLED));
+    for (int i = 0; i < 4; ++i) {
+        uint lists = 0u, at = 0u;
+        for (int k = 0; k < 7; ++k) {
+            uint bit = bits[k] >> i & 1u;
+            at = bit != 0u ? next[k] : at;
+            next[k] += bit;
+            lists += bit;
+        }
+        if (lists != 0u) list_entries[at] = list_entry(block + in_block(i));
+    }
+}
+
+#if SAMPLES_PER_AXIS > 1
+// List of a pixel, or NO_LIST, from the samples near its centre, which is in `key`.
+uint list_of(ivec2 middle, out uint key) {
+    uint keys[FILTER_NEAR] = near_surface_ids(middle);
+    key = keys[0];
+    bool mixed = false;
+    // Test three zones for decals: that of the centre, and the first and the last other one. Few
+    // pixels see a fourth.
+    uint first = key, last = key;
+    ivec2 first_at = middle, last_at = middle;
+    for (int i = 1; i < FILTER_NEAR; ++i) {
+        mixed = mixed || keys[i] != key;
+        if (id_zone(keys[i]) == id_zone(key)) continue;
+        last = keys[i];
+        last_at = middle + FILTER_OFFSET[i];
+        if (first == key) { first = last; first_at = last_at; }
+    }
+    uint part = key;
+    ivec2 part_at = middle;
+    bool decal = false;
+    int parts = first == key ? 1 : first_at == last_at ? 2 : 3, tested = 0;
+    do {
+        decal = decal || (part != 0u && near_decals(id_zone(part), texelFetch(atlas_positions, part_at, 0).xy));
+        part = tested == 0 ? first : last;
+        part_at = tested == 0 ? first_at : last_at;
+    } while (++tested < parts);
+    uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
+    if (mixed) list = decal ? LIST_MIXED_DECAL : LIST_MIXED;
+#if DAMAGED
+    int near = key != 0u ? damage_near(rest_at(middle), middle) : 0;
+    if (near > 0) list = mixed ? LIST_MIXED_DAMAGED : LIST_DAMAGED;
+    if (near > 1) list = LIST_HOLED;
+#endif
+    return list;
+}
+
+// One invocation classifies a 2x2 block. Each list grows once, and pixels that the driver shades at once
+// are more alike than those of a row.
+void main() {
+    ivec2 in_region = 2 * in_turn((region.zw + 1) / 2);
+    if (in_region.y >= region.w) return;
+    ivec2 block = region.xy + in_region;
+    uint plain = 0u, decals = 0u, mixed = 0u, mixed_decals = 0u;   // One bit per pixel and class.
+    uint damaged = 0u, mixed_damaged = 0u, holed = 0u;
+    int i = 0;
+    do {
+        ivec2 pixel = block + in_block(i);
+        if (any(greaterThanEqual(pixel - region.xy, region.zw))) continue;
+        ivec2 middle = center_texel(pixel);
+        uint key, list = list_of(middle, key), bit = 1u << i;
+        if (key != 0u) write_labels(pixel, key, texelFetch(surface_depths, middle, 0).r);
+        plain |= list == LIST_PLAIN ? bit : 0u;
+        decals |= list == LIST_DECAL ? bit : 0u;
+        mixed |= list == LIST_MIXED ? bit : 0u;
+        mixed_decals |= list == LIST_MIXED_DECAL ? bit : 0u;
+#if DAMAGED
+        damaged |= list == LIST_DAMAGED ? bit : 0u;
+        mixed_damaged |= list == LIST_MIXED_DAMAGED ? bit : 0u;
+        holed |= list == LIST_HOLED ? bit : 0u;
+#endif
+    } while (++i < 4);
+    list_block(block, plain, decals, mixed, mixed_decals, damaged, mixed_damaged, holed);
+}
+#else
 // One invocation classifies a 2x2 block, so that four gathers read it and each list grows once.
 void main() {
     ivec2 in_region = 2 * in_turn((region.zw + 1) / 2);
@@ -103,47 +184,6 @@ void main() {
         if (near_decals(id_zone(key[i]), vec2(atlas_x[i], atlas_y[i]))) decals |= bit;
         else plain |= bit;
     }
-    list_each(LIST_PLAIN, block, plain);
-    list_each(LIST_DECAL, block, decals);
-#if DAMAGED
-    list_each(LIST_DAMAGED, block, damaged);
-    list_each(LIST_HOLED, block, holed);
-#endif
-}
-#else
-void main() {
-    ivec2 in_region = in_turn(region.zw);
-    if (in_region.y >= region.w) return;
-    ivec2 pixel = region.xy + in_region;
-    ivec2 middle = center_texel(pixel);
-    uint keys[FILTER_NEAR] = near_surface_ids(middle);
-    uint key = keys[0];
-    bool mixed = false;
-    // Test three zones for decals: that of the centre, and the first and the last other one. Few
-    // pixels see a fourth.
-    uint first = key, last = key;
-    ivec2 first_at = middle, last_at = middle;
-    for (int i = 1; i < FILTER_NEAR; ++i) {
-        mixed = mixed || keys[i] != key;
-        if (id_zone(keys[i]) == id_zone(key)) continue;
-        last = keys[i];
-        last_at = middle + FILTER_OFFSET[i];
-        if (first == key) { first = last; first_at = last_at; }
-    }
-    uint part[3] = uint[3](key, first, last);
-    ivec2 part_at[3] = ivec2[3](middle, first_at, last_at);
-    bool decal = false;
-    for (int i = 0; i < 3; ++i)
-        decal = decal || (part[i] != 0u && near_decals(id_zone(part[i]),
-                                                       texelFetch(atlas_positions, part_at[i], 0).xy));
-    if (key != 0u) write_labels(pixel, key, texelFetch(surface_depths, middle, 0).r);
-    uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
-    if (mixed) list = decal ? LIST_MIXED_DECAL : LIST_MIXED;
-#if DAMAGED
-    int near = key != 0u ? damage_near(rest_at(middle), middle) : 0;
-    if (near > 0) list = mixed ? LIST_MIXED_DAMAGED : LIST_DAMAGED;
-    if (near > 1) list = LIST_HOLED;
-#endif
-    if (list != NO_LIST) list_entries[listed(list, 1u)] = list_entry(pixel);
+    list_block(block, plain, decals, 0u, 0u, damaged, 0u, holed);
 }
 #endif

@@ -153,6 +153,7 @@ class VisibilityBuffer:
     def _texture(self, components: int, dtype: str) -> moderngl.Texture:
         made = self._ctx.texture((self._fine[0], self._rows), components, dtype=dtype)
         made.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        made.repeat_x = made.repeat_y = False  # faster than repeating
         return self._own(made)
 
     def _own(self, made: T) -> T:

@@ -53,10 +53,9 @@ class ShadingPass:
         )
         program = self._programs.get(("classify.comp",), variant)
         program.bind(inputs.textures)
-        side = 2 if variant.samples_per_axis == 1 else 1  # a shader invocation takes a block
         for region in regions:
             program["region"] = region
-            across, down = (-(-length // side) for length in region[2:])
+            across, down = (-(-length // 2) for length in region[2:])  # in blocks of 2x2
             program.dispatch(-(-across * down // LIST_GROUP))
 
     def _shade(self, inputs: DrawInputs) -> None:
