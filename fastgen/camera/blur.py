@@ -56,7 +56,8 @@ def defocused(light: Light, radius_px: NDArray[np.float32]) -> Light:
         share = np.clip(1 - np.abs(radius_px - np.float32(level)) / np.float32(step), 0, 1)
         if share.any():
             blurred = cv2.filter2D(light, -1, _disc(float(level)), borderType=cv2.BORDER_REFLECT)
-            result += (share if len(levels) > 1 else np.ones_like(share))[..., None] * blurred
+            share = share if len(levels) > 1 else np.ones_like(share)
+            result += cv2.merge([share] * 3) * blurred
     return result
 
 

@@ -1,5 +1,6 @@
 """Vignetting and noise of linear light; what cameras do to the encoded image."""
 
+import math
 from functools import lru_cache
 from statistics import NormalDist
 
@@ -15,9 +16,6 @@ _CHROMA_TO_RGB = np.array([[0, 1.402], [-0.344136, -0.714136], [1.772, 0]])
 """Red, green and blue per unit of Cb and Cr at constant luma (ITU-R BT.601, as in JFIF)."""
 
 _QUANTILES = 1 << 16
-
-_BAND_ROWS = 32
-"""Number of rows whose noise is computed at once, so that they stay in the processor's cache."""
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 _CAP_PX = 21.0
@@ -40,14 +38,17 @@ def vignette(size: tuple[int, int], corner_loss: float) -> Light:
     x = (np.arange(width, dtype=np.float32) + 0.5) / width * 2 - 1
     y = (np.arange(height, dtype=np.float32) + 0.5) / height * 2 - 1
     across, down = width**2 / (width**2 + height**2), height**2 / (width**2 + height**2)
-    square = across * x**2 + down * y[:, None] ** 2
-    steep = (1 - corner_loss) ** -0.5 - 1
-    fall = np.reciprocal(np.asarray(1 + steep * square, np.float32))
+    fall = np.asarray(across * x**2 + down * y[:, None] ** 2, np.float32)
+    fall *= np.float32((1 - corner_loss) ** -0.5 - 1)
+    fall += 1
+    np.reciprocal(fall, out=fall)
     fall *= fall
     return fall[..., None]
 
 
-def noisy(light: Light, noise: Noise, gain: float = 1.0) -> Light:
+def noisy(
+    light: Light, noise: Noise, gain: float = 1.0, raw: np.random.SFC64 | None = None
+) -> Light:
     """Return light with shot noise and read noise.
 
     Light of 1 is the full well divided by the gain, in electrons.
@@ -55,25 +56,30 @@ def noisy(light: Light, noise: Noise, gain: float = 1.0) -> Light:
     EMVA 1288 release 4.0, section 2.2: sigma^2 = sigma_d^2 + mu electrons. A normal distribution
     approximates the Poisson distribution of the electron count, which is close above ten electrons.
     The channels of a pixel are independent; demosaicing is not modelled.
+
+    Args:
+        light: float32 [H, W, 3].
+        noise: Parameters of the sensor.
+        gain: Amplification.
+        raw: Source of random numbers, for bands of one image; by default a new one with the seed of
+            `noise`.
     """
-    rng = np.random.Generator(np.random.SFC64(noise.seed))
     well = np.float32(noise.full_well_e / gain)
-    result = np.empty_like(light)
-    for top in range(0, len(light), _BAND_ROWS):
-        part, spread = light[top : top + _BAND_ROWS], result[top : top + _BAND_ROWS]
-        np.maximum(part, 0, out=spread)
-        spread *= well
-        spread += np.float32(noise.read_noise_e**2)
-        np.sqrt(spread, out=spread)
-        spread *= _standard_normal(rng, part.shape)
-        spread *= 1 / well
-        spread += part
-    return result
+    spread = np.maximum(light, 0)
+    spread *= well
+    spread += np.float32(noise.read_noise_e**2)
+    np.sqrt(spread, out=spread)
+    spread *= _standard_normal(raw or np.random.SFC64(noise.seed), light.shape)
+    spread *= 1 / well
+    spread += light
+    return spread
 
 
-def _standard_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Light:
+def _standard_normal(raw: np.random.SFC64, shape: tuple[int, ...]) -> Light:
     """Return normally distributed numbers of a shape, in a third of NumPy's time."""
-    return _quantiles().take(rng.integers(0, _QUANTILES, shape, np.uint16))
+    count = math.prod(shape)
+    codes = raw.random_raw(-(-count // 4)).view(np.uint16)[:count]
+    return _quantiles().take(codes).reshape(shape)
 
 
 @lru_cache(maxsize=1)

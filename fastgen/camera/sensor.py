@@ -36,6 +36,9 @@ _UNMETERED = Exposure(1.0)
 _METER_STEP = 8
 """Distance in pixels between the pixels in which a meter looks for highlights."""
 
+_BAND_ROWS = 32
+"""Number of rows that are recorded at once, so that they stay in the processor's cache."""
+
 _NODE_PX = 8
 """Distance in pixels between the pixels whose rays are computed; others are interpolated. Without
 lens distortion, with a focal length of f pixels, ray lengths are wrong by up to 16 / f^2 of their
@@ -87,9 +90,7 @@ def apply_camera_model(
             times = _for_highlights(light, sensor)
             if times < 1:
                 light, exposure = light * np.float32(times), exposure.lowered(times)
-        light = _recorded(light, frame, view, camera, exposure)
-        curve = sensor.response
-        image = respond(light, curve) if curve else tone_map_and_encode(light)
+        image = _developed(_blurred(light, frame, camera, exposure), sensor, exposure.gain)
     if sensor.chroma_noise:
         image = with_chroma_noise(image, sensor.chroma_noise, exposure.gain)
     if sensor.sharpening:
@@ -129,25 +130,37 @@ def _for_highlights(light: Light, sensor: Sensor) -> float:
     return min(max(white / max(float(brightest), white), 0.5), 1.0)
 
 
-def _recorded(light: Light, frame: Frame, view: View, camera: Camera, exposure: Exposure) -> Light:
-    sensor, (width, _) = camera.sensor or Sensor(), view.size
+def _blurred(light: Light, frame: Frame, camera: Camera, exposure: Exposure) -> Light:
+    sensor, width = camera.sensor or Sensor(), light.shape[1]
     if sensor.defocus:
         light = defocused(light, blur_radius_px(sensor.defocus, camera, width, frame.depth))
     right, down = (
         moved + exposure.shutter_s * speed
         for moved, speed in zip(sensor.motion, sensor.speed, strict=True)
     )
-    light = motion_blurred(light, (right * width, down * width))
+    return motion_blurred(light, (right * width, down * width))
+
+
+def _developed(light: Light, sensor: Sensor, gain: float) -> NDArray[np.uint8]:
+    """Return the image of blurred light, by the effects that treat each pixel for itself."""
+    height, width = light.shape[:2]
     times = np.float32(2.0**sensor.exposure_error_ev)
+    factor = np.full((height, width), times)
     if sensor.vignetting:
-        light = light * (times * vignette(view.size, sensor.vignetting))
-    elif times != 1:
-        light = light * times
-    if sensor.noise:
-        light = noisy(light, sensor.noise, exposure.gain)
-    if sensor.gains != (1, 1, 1):
-        light = np.asarray(cv2.transform(light, np.diag(sensor.gains).astype(np.float32)))
-    return light
+        factor *= vignette((width, height), sensor.vignetting)[..., 0]
+    raw = np.random.SFC64(sensor.noise.seed) if sensor.noise else None
+    gains = np.diag(sensor.gains).astype(np.float32)
+    image = np.empty(light.shape, np.uint8)
+    for top in range(0, height, _BAND_ROWS):
+        rows = slice(top, top + _BAND_ROWS)
+        part = light[rows] * cv2.merge([factor[rows]] * 3)  # NumPy is slow along an axis of three
+        if sensor.noise:
+            part = noisy(part, sensor.noise, gain, raw)
+        if sensor.gains != (1, 1, 1):
+            part = np.asarray(cv2.transform(part, gains))
+        curve = sensor.response
+        image[rows] = respond(part, curve) if curve else tone_map_and_encode(part)
+    return image
 
 
 def _along_rays(

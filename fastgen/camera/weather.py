@@ -90,13 +90,13 @@ def _behind(
     edge = cv2.BORDER_REPLICATE
     count, total = (
         cv2.boxFilter(part, -1, sides, normalize=False, borderType=edge)[mixed]
-        for part in (bare.astype(np.float32), light * bare[..., None])
+        for part in (bare.astype(np.float32), cv2.copyTo(light, bare.view(np.uint8)))
     )
     beyond = np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], own)
     usual = light[whole].mean(axis=0) if whole.any() else beyond
     square = np.ones(sides, np.uint8)
-    near = cv2.dilate(whole.astype(np.uint8), square, borderType=edge)[mixed] > 0
-    brightest = cv2.dilate(light * whole[..., None], square, borderType=edge)[mixed]
+    near = cv2.dilate(whole.view(np.uint8), square, borderType=edge)[mixed] > 0
+    brightest = cv2.dilate(cv2.copyTo(light, whole.view(np.uint8)), square, borderType=edge)[mixed]
     most = np.where(near[:, None], brightest, usual)
     return np.asarray(np.clip((1 - share) * beyond, own - share * most, own), np.float32)
 
