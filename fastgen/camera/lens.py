@@ -118,7 +118,8 @@ class Distortion:
         t = np.arctan(radius) if self._fisheye else radius
         inner = np.minimum(t, self._end)
         bent = self._curve(inner) + self._end_slope * (t - inner)
-        scale = np.divide(bent, radius, out=np.ones_like(bent), where=radius > 1e-12)
+        scale = np.where(radius > 1e-12, bent / np.maximum(radius, 1e-12), 1.0)
+        seen = np.empty(points.shape)
         across, down = x * scale, y * scale
         if any(self._p):
             # tangential distortion, which is constant beyond the end of the polynomial
@@ -126,7 +127,8 @@ class Distortion:
             right, below = self._tangential(x * inside, y * inside)
             across += right
             down += below
-        return np.stack([across, down], axis=-1)
+        seen[..., 0], seen[..., 1] = across, down
+        return seen
 
     def remove(self, seen: ArrayLike) -> Array:
         """Return the ideal points of distorted positions [..., 2]: the inverse of `apply`."""
@@ -147,8 +149,11 @@ class Distortion:
     @cached_property
     def reach(self) -> Array:
         """Half of the size [2] of a rectangle around the ideal points of the whole image."""
-        x, y = np.meshgrid(*(np.linspace(-1, 1, 33),) * 2)
-        ideal = self.remove(np.stack([x, y], axis=-1) * self._half_size)
+        along = np.linspace(-1, 1, 33)
+        edge = np.ones_like(along)
+        # the image is not folded, so its border bounds it
+        sides = [(along, edge), (along, -edge), (edge, along), (-edge, along)]
+        ideal = self.remove(np.moveaxis(np.array(sides), 1, 2) * self._half_size)
         return np.asarray(1.05 * np.abs(ideal).max(axis=(0, 1)))
 
     @cached_property
@@ -158,11 +163,10 @@ class Distortion:
 
     def _slopes(self, ideal: Array) -> tuple[Array, Array]:
         """Return the derivatives [..., 2] of `apply` by x and by y of the ideal point."""
-        x, y = (
-            (self.apply(ideal + nudge) - self.apply(ideal - nudge)) / (2 * _NUDGE)
-            for nudge in np.eye(2) * _NUDGE
-        )
-        return x, y
+        # one call for all four, because most calls have few points
+        beside = np.stack([ideal + nudge for nudge in np.array([*np.eye(2), *-np.eye(2)]) * _NUDGE])
+        right, down, left, up = self.apply(beside)
+        return (right - left) / (2 * _NUDGE), (down - up) / (2 * _NUDGE)
 
     def _folds(self) -> bool:
         """Return whether two ideal points share a position in the image."""

@@ -167,21 +167,12 @@ def _container(shot: Shot) -> Object:
     if passes_camera:
         pixels = pixels_beyond(prepared.facets, view)
     (bounds,) = boxes(pixels, np.zeros(len(pixels), np.int64), 1)
-    sides = corners[list(_SIDES)]
-    if shot.lens:
-        sides = _pieces(sides)
-    polygons = project(Facets.of(sides, np.zeros(len(sides), np.int64)), view).polygons
-    if not passes_camera:  # otherwise the near plane opens the box, and its inner sides are seen
-        polygons = polygons[facing(polygons)]
-    # void pixels within the box are not hidden; only the spreader and other containers hide any
-    asked = None if shot.hiding is None else mask_box(shot.hiding)
-    alone = covered(
-        polygons, np.zeros(len(polygons), np.int64), 1, view.size, asked or (0, 0, 0, 0)
-    )
-    hidden = 0 if shot.hiding is None or asked is None else int(alone.shown(shot.hiding)[0])
+    hidden = beyond = 0
+    if area:  # otherwise its fraction is 0
+        hidden, beyond = _unseen(shot, corners, passes_camera)
     castings, polygon = _castings(shot, corners)
     (amodal_bbox,) = float_boxes(bounds[None])
-    told = visibility(shot.config, shot.view.size, area, hidden, int(alone.beyond[0]))
+    told = visibility(shot.config, shot.view.size, area, hidden, beyond)
     if area and ((bounds[:2] < 0).any() or (bounds[2:] > view.size).any()):
         told["truncated"] = True  # damage bulges out of the box
     return Object(
@@ -195,6 +186,29 @@ def _container(shot: Shot) -> Object:
         keypoints=castings,
         **told,
     )
+
+
+def _unseen(shot: Shot, corners: NDArray[np.float64], passes_camera: bool) -> tuple[int, int]:
+    """Count the hidden pixels of the container's box with these corners, and those outside the
+    image.
+
+    Args:
+        shot: The image.
+        corners: Corners [8, 3] of the box.
+        passes_camera: A part of the container is before the near plane.
+    """
+    sides = corners[list(_SIDES)]
+    if shot.lens:
+        sides = _pieces(sides)
+    polygons = project(Facets.of(sides, np.zeros(len(sides), np.int64)), shot.view).polygons
+    if not passes_camera:  # otherwise the near plane opens the box, and its inner sides are seen
+        polygons = polygons[facing(polygons)]
+    # void pixels within the box are not hidden; only the spreader and other containers hide any
+    asked = None if shot.hiding is None else mask_box(shot.hiding)
+    owner = np.zeros(len(polygons), np.int64)
+    alone = covered(polygons, owner, 1, shot.view.size, asked or (0, 0, 0, 0))
+    hidden = 0 if shot.hiding is None or asked is None else int(alone.shown(shot.hiding)[0])
+    return hidden, int(alone.beyond[0])
 
 
 def _spreader(shot: Shot) -> list[Object]:
