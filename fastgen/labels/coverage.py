@@ -98,13 +98,13 @@ def project(facets: Facets, view: View) -> Projected:
 
 def pixels_beyond(facets: Facets, view: View) -> Array:
     """Return image positions [P, 2] of all corners of the part of facets beyond the near plane."""
-    pixels, depth = view.project(facets.points_mm)
-    distance = depth - NEAR_M
+    distance = view.to_view(facets.points_mm)[:, 2] - NEAR_M
+    pixels, _ = view.project(facets.points_mm.compress(distance >= 0, axis=0))
     before = (distance < 0).take(facets.corners)
     crossing = before.any(axis=1) & ~before.all(axis=1)
     cut = replace(facets, corners=facets.corners.compress(crossing, axis=0)).beyond(distance)
     more, _ = view.project(cut.points_mm)
-    return np.concatenate([pixels.compress(distance >= 0, axis=0), more])
+    return np.concatenate([pixels, more])
 
 
 def facing(polygons: Array) -> NDArray[np.bool_]:

@@ -120,7 +120,9 @@ def _damaged(
     rest_mm = points.rest_mm(asked)
     part = in_hole(damage, rest_mm) | is_marked(damage, rest_mm)
     if form_of(damage).marked is None:
-        part |= np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm
+        rest = np.flatnonzero(~part)
+        moved_mm = np.abs(amount_mm(damage, rest_mm.take(rest, axis=0)))
+        part[rest] = moved_mm > shot.config.damage.mask_threshold_mm
     found = asked[part]
     return found, points.within.take(found) & (drawn.take(found) != value)
 

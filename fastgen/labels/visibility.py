@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypedDict
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,19 +47,26 @@ class Shot:
 
     def of_member(self, member: Member) -> "Shot":
         """Return the image with one container of its scene alone, in the frame of the container."""
-        numbers, damage = member.prepared.numbers, self.frame.damage
-        known = np.zeros(max(int(damage.max()), *DAMAGE_VALUES) + 1, damage.dtype)
-        values = np.array([numbers.undamaged, *numbers.damages])
-        known[values] = values
-        own = known.take(damage)
+        damage = self.frame.damage
+        mine = self._whose == member.number + 1
         return Shot(
-            replace(self.frame, damage=own),
+            replace(self.frame, damage=np.asarray(cv2.copyTo(damage, mine.view(np.uint8)))),
             member.prepared,
             self.view.in_frame(member.pose),
             self.config,
-            (damage > 0) & (own == 0),
+            (self._whose > 0) & ~mine,
             self.prepared.others[member.number],
         )
+
+    @cached_property
+    def _whose(self) -> NDArray[np.uint8]:
+        """Number of the container that each pixel [H, W] shows, plus 1; 0 for everything else."""
+        damage = self.frame.damage
+        numbers = np.zeros(max(int(damage.max()), *DAMAGE_VALUES) + 1, np.uint8)
+        for each in self.prepared.members:
+            carried = each.prepared.numbers
+            numbers[[carried.undamaged, *carried.damages]] = each.number + 1
+        return numbers.take(damage)
 
     @property
     def scene(self) -> Scene:

@@ -113,5 +113,6 @@ def clear_radius_mm(ground: Ground, members: Sequence[Member], props: Sequence[P
     It reaches just beyond the containers and props of the scene.
     """
     boxes = [member.box for member in members] + [prop_box(prop) for prop in props]
-    far = [np.linalg.norm(box.corners_mm[:, :2], axis=-1).max() for box in boxes]
-    return min(max(far, default=0.0) + _CLEARANCE_MM, GROUND_FADE_START * ground.reach_mm)
+    corners_mm = np.reshape([box.corners_mm for box in boxes], (-1, 3))
+    far = float(np.linalg.norm(corners_mm[:, :2], axis=-1).max(initial=0.0))
+    return min(far + _CLEARANCE_MM, GROUND_FADE_START * ground.reach_mm)

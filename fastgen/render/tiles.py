@@ -111,13 +111,15 @@ class Tiles:
         Returns:
             Signed distances [E, rows + 1, columns + 1] in the plane.
         """
-        along = np.roll(hull, -1, axis=0) - hull
-        length = np.sqrt((along * along).sum(axis=1, keepdims=True))
-        normal = along[:, ::-1] * (1, -1) / np.maximum(length, 1e-12)
+        # NumPy is slow along an axis of two
+        x, y = hull.T
+        right, down = (np.append(side[1:], side[0]) - side for side in (x, y))
+        length = np.maximum(np.sqrt(right * right + down * down), 1e-12)
+        normal_x, normal_y = down / length, -right / length
         rows, columns = part
         corners = self._plane[rows.start : rows.stop + 1, columns.start : columns.stop + 1]
-        offset = (normal * hull).sum(axis=1)
-        distance = normal @ corners.reshape(-1, 2).T - offset[:, None]
+        offset = normal_x * x + normal_y * y
+        distance = np.stack([normal_x, normal_y], 1) @ corners.reshape(-1, 2).T - offset[:, None]
         return np.asarray(distance.reshape(-1, *corners.shape[:2]), np.float64)
 
     def rectangles(self, mask: Mask) -> NDArray[np.int32]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.data import Pose, Prop
+from fastgen.scene.limits import MAX_PROPS
 
 _TOUCHING_MM = 1e-3
 """Overlap that counts as touching, because poses are rounded."""
@@ -18,6 +19,8 @@ _CABLES_MM = 5e4
 """Height of the space above a container that a spreader holds; cables lead up through it."""
 
 Array = NDArray[np.float64]
+
+_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 
 
 def rotation_of(pose: Pose) -> Array:
@@ -44,8 +47,7 @@ class OrientedBox:
     @cached_property
     def corners_mm(self) -> Array:
         """Its corners [8, 3] in the world."""
-        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        return self.center_mm + (signs * self.half_mm) @ self.rotation.T
+        return self.center_mm + (_SIGNS * self.half_mm) @ self.rotation.T
 
     @cached_property
     def axes(self) -> Array:
@@ -91,6 +93,7 @@ def container_box(kind: str, pose: Pose) -> OrientedBox:
     return OrientedBox(middle, half, turn)
 
 
+@lru_cache(maxsize=2 * MAX_PROPS)  # each image of a scene needs them several times
 def prop_box(prop: Prop) -> OrientedBox:
     """Return the box around a prop."""
     half = np.array(prop.size_mm) / 2

@@ -113,10 +113,12 @@ class GroundPass:
         """Fill and bind the ground's uniform block, and return the light on the ground."""
         scene, kept = prepared.scene, self._light_of(prepared)
         assert scene.ground is not None
-        lights = _world_lights(scene, self._ambient(scene.environment))
-        toward = np.array(lights[0].direction if lights else (0.0, 0.0, 1.0))
-        values = ground_values(scene.ground, prepared.present, scene.props, kept.light, toward)
-        self._block.write(GROUND_BLOCK.pack(values))
+        if kept.block is None:
+            lights = _world_lights(scene, self._ambient(scene.environment))
+            toward = np.array(lights[0].direction if lights else (0.0, 0.0, 1.0))
+            values = ground_values(scene.ground, prepared.present, scene.props, kept.light, toward)
+            kept.block = GROUND_BLOCK.pack(values)
+        self._block.write(kept.block)
         self._block.bind_to_uniform_block(GROUND_BLOCK.binding)
         return kept
 
@@ -231,7 +233,9 @@ class _CoarseTarget:
 
 
 class _SceneLight:
-    """Light on the ground of one scene, and its texture."""
+    """Light on the ground of one scene, its texture, and the uniform block once it is packed."""
+
+    block: bytes | None = None
 
     def __init__(self, ctx: moderngl.Context, light: GroundLight) -> None:
         rows, columns = light.texels.shape[:2]
