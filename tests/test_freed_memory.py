@@ -20,6 +20,25 @@ print(held - before, resident_kb() - before, sum(map(len, kept)))
 """
 
 
+KEEPING = """
+import resource
+import numpy as np
+from fastgen.dataset.freed_memory import keep_freed_memory
+
+keep_freed_memory()
+for _ in range(100):
+    np.ones(1_000_000, np.float32)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    np.ones(1_000_000, np.float32)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+
+
+def test_arrays_of_the_next_image_take_the_pages_of_the_last_one() -> None:
+    out = subprocess.run([sys.executable, "-c", KEEPING], capture_output=True, check=True)
+    assert int(out.stdout) < 100  # of a thousand
+
+
 def test_pages_between_blocks_in_use_are_returned() -> None:
     out = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, check=True)
     held, left, kept = map(int, out.stdout.split())

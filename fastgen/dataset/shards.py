@@ -18,7 +18,7 @@ import cv2
 import orjson
 
 from fastgen.dataset.console import LOGGER
-from fastgen.dataset.freed_memory import return_freed_memory
+from fastgen.dataset.freed_memory import keep_freed_memory, return_freed_memory
 from fastgen.dataset.job import Job, Task, manifest_path, scene_and_camera
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.storage import storage_of
@@ -119,6 +119,7 @@ class Maker:
             # llvmpipe reads this at its first context
             os.environ.setdefault("LP_NUM_THREADS", "0")
             cv2.setNumThreads(1)
+            keep_freed_memory()
         LOGGER.handlers = [_Announcer(report)]
         LOGGER.setLevel(logging.INFO)
         self._job = job

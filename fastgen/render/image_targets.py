@@ -149,7 +149,7 @@ def frame_of(color: NDArray[Any], labels: NDArray[np.uint32], depth: NDArray[np.
     radiance = color.dtype == np.float32
     if radiance:
         image = np.zeros((height, width, 3), np.uint8)
-        cover = np.rint(255 * np.clip(cover, 0, 1))
+        cover = cv2.convertScaleAbs(cover, alpha=255)
     else:
         image = np.asarray(rgb, np.uint8)
     return Frame(
