@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
-from fastgen.geometry.damage_law import inward_mm
 from fastgen.geometry.prepared_scene import Member
 from fastgen.light.directional_lights import DirectionalLight
 from fastgen.render.ground_values import clear_radius_mm
 from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
+from fastgen.render.visible_members import solid_mm
 from fastgen.scene import Ground, Prop
-from fastgen.scene.boxes import OrientedBox, away_mm, prop_box
-from fastgen.scene.damage_kinds import form_of
-from fastgen.scene.limits import MM, NEAR_M
+from fastgen.scene.boxes import OrientedBox, prop_box
+from fastgen.scene.limits import MM
 
 _SHADED_MM = 600.0
 """Distance from a prop within which it shades the ground, see ground_props.glsl."""
@@ -25,13 +24,6 @@ _SHADED_MM = 600.0
 _FILTER_PX = 0.7
 """Radius in pixels over which ground.frag filters edges of shadows on a plane seen face-on: 0.35
 pixels of an image that may have half the resolution."""
-
-_SKIN_MM = 150.0
-"""Depth below its outer box from which an undamaged container hides what is behind it."""
-
-_LEAST_AWAY_MM = 5 * NEAR_M / MM
-"""Distance of a container to the camera from which the near plane cuts off no visible part of it;
-rays are at most 78 degrees off the axis."""
 
 Array = NDArray[np.float64]
 
@@ -92,7 +84,7 @@ def ground_plan(
     shown = shaded = dark = _none(tiles)
     masks = None
     eye_mm = view.position_m / MM
-    solids = [solid for each in members if (solid := _solid_mm(each, eye_mm)) is not None]
+    solids = [solid for each in members if (solid := solid_mm(each, eye_mm)) is not None]
     hidden = tiles.filled(np.reshape(solids, (-1, 8, 3)))
     if props:
         parts = [prop_box(prop) for prop in props]
@@ -145,21 +137,6 @@ def _plane_tiles(tiles: Tiles, ground: Ground, alone_mm: float) -> tuple[Mask, M
     rows = some[:-2] | some[1:-1] | some[2:]
     seen: Mask = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
     return seen, near
-
-
-def _solid_mm(member: Member, eye_mm: Array) -> Array | None:
-    """Return corners [8, 3] of a box through which nothing behind a container is seen.
-
-    None for a container with holes, with too deep dents, or beside the camera.
-    """
-    if away_mm(member.box, eye_mm) < _LEAST_AWAY_MM:
-        return None
-    damages = member.prepared.scene.damages
-    skin_mm = _SKIN_MM + sum(map(inward_mm, damages))
-    half = member.box.half_mm - skin_mm
-    if half.min() <= 0 or any(form_of(damage).outline for damage in damages):
-        return None
-    return OrientedBox(member.box.center_mm, half, member.box.rotation).corners_mm
 
 
 def _reaches(

@@ -42,10 +42,11 @@ from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes
 from fastgen.render.surface_values import SceneMaterials
+from fastgen.render.tiles import Tiles
 from fastgen.render.variant import ShaderVariant
+from fastgen.render.visible_members import visible_members
 from fastgen.render.zone_codes import SPREADER_ZONE
 from fastgen.scene import Camera, EnvironmentView, Scene
-from fastgen.scene.boxes import back_to_front
 from fastgen.scene.damage_kinds import program_kinds
 from fastgen.scene.limits import MM
 
@@ -157,7 +158,7 @@ class Renderer:
     ) -> ImageTargets:
         """Draw an image, and fill `normals` [H, W, 3] if given.
 
-        Containers do not overlap. Several are drawn over one another from back to front.
+        Containers do not overlap. Those that may be visible are drawn from back to front.
         """
         prepared, view, scene = image.prepared, image.view, image.prepared.scene
         self._compile_for(prepared)
@@ -181,9 +182,8 @@ class Renderer:
         self._background.run(inputs, plan)
         if plan is not None:
             self._ground.run(inputs, prepared, plan)
-        present = prepared.present
-        for number in back_to_front([each.box for each in present], view.position_m / MM):
-            member = present[number]
+        tiles = Tiles(view) if plan is None else plan.tiles
+        for member in visible_members(prepared.present, view, tiles):
             inputs = self._inputs(member.prepared, view.in_frame(member.pose), options, around)
             if inputs.regions.surfaces:
                 self._light(inputs, member, prepared, exposure)

@@ -1,0 +1,76 @@
+"""Choice of the containers that are drawn in an image."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.camera.projection import View
+from fastgen.geometry.damage_law import inward_mm
+from fastgen.geometry.prepared_scene import Member
+from fastgen.render.regions import box_corners
+from fastgen.render.tiles import Tiles
+from fastgen.scene.boxes import OrientedBox, away_mm, back_to_front, rotation_of
+from fastgen.scene.damage_kinds import form_of
+from fastgen.scene.limits import MM, NEAR_M
+
+_SKIN_MM = 150.0
+"""Depth below its outer box from which an undamaged container hides what is behind it."""
+
+_LEAST_AWAY_MM = 5 * NEAR_M / MM
+"""Distance of a container to the camera from which the near plane cuts off no visible part of it;
+rays are at most 78 degrees off the axis."""
+
+Array = NDArray[np.float64]
+
+
+def visible_members(members: Sequence[Member], view: View, tiles: Tiles) -> list[Member]:
+    """Return at least the containers that an image shows, in the order in which they are drawn.
+
+    A container never hides one that comes later. Left out are containers outside of the image, and
+    those that nearer ones hide.
+
+    Args:
+        members: Containers that are present.
+        view: Projection of the image, in the world frame.
+        tiles: Its tiles.
+
+    Raises:
+        ConfigError: Containers hide one another in a circle.
+    """
+    eye_mm = view.position_m / MM
+    hidden = np.zeros(tiles.shape, bool)
+    found = []
+    for number in reversed(back_to_front([each.box for each in members], eye_mm)):
+        member = members[number]
+        # a spreader may be visible above its container
+        if member.prepared.spreader is not None or (_touched(member, tiles) & ~hidden).any():
+            found.append(member)
+            solid = solid_mm(member, eye_mm)
+            if solid is not None:
+                hidden |= tiles.filled(solid[None])
+    return found[::-1]
+
+
+def solid_mm(member: Member, eye_mm: Array) -> Array | None:
+    """Return corners [8, 3] of a box through which nothing behind a container is seen.
+
+    None for a container with holes, with too deep dents, or beside the camera.
+    """
+    if away_mm(member.box, eye_mm) < _LEAST_AWAY_MM:
+        return None
+    damages = member.prepared.scene.damages
+    skin_mm = _SKIN_MM + sum(map(inward_mm, damages))
+    half = member.box.half_mm - skin_mm
+    if half.min() <= 0 or any(form_of(damage).outline for damage in damages):
+        return None
+    return OrientedBox(member.box.center_mm, half, member.box.rotation).corners_mm
+
+
+def _touched(member: Member, tiles: Tiles) -> NDArray[np.bool_]:
+    """Return at least the tiles [R, C] that a container without its spreader touches."""
+    own = member.prepared
+    corners_mm = box_corners(own.container.bounds_mm, own.scene.damages)
+    in_world_mm = corners_mm @ rotation_of(member.pose).T + member.pose.position_mm
+    found: NDArray[np.bool_] = tiles.touched(in_world_mm[None])[0]
+    return found
