@@ -45,7 +45,7 @@ def camera(name: str) -> Camera:
 def listed(scene: Scene, name: str, size: tuple[int, int] = FINE) -> list[int]:
     view = view_of(camera(name), size)
     members = visible_members(PreparedScene(scene).present, view, Tiles(view))
-    return [member.number for member in members]
+    return [member.number for member, _ in members]
 
 
 @pytest.mark.parametrize("name", TOWARD)
@@ -57,6 +57,26 @@ def test_every_container_with_visible_pixels_is_listed(generator, scene, name):
         if np.isin(seen, [each.undamaged]).any()
     }
     assert shown <= set(listed(scene, name, SIZE))
+
+
+def test_a_partly_hidden_container_is_drawn_where_it_may_be_visible(generator, scene):
+    aside = replace(scene.neighbours[0], pose=Pose((3000.0, 12000.0, 0.0), 0.0))
+    partly = replace(scene, neighbours=(aside,))
+    view = view_of(camera("front"), FINE)
+    (behind, part), _ = visible_members(PreparedScene(partly).present, view, Tiles(view))
+    assert behind.number == 1
+    rows, columns = np.nonzero(
+        np.isin(
+            generator.render(scene=partly, camera=camera("front")).damage,
+            [scene_numbers(partly)[1].undamaged],
+        )
+    )
+    left, top, width, height = np.array(part) * SIZE[0] / FINE[0]
+    assert columns.min() >= left - 1
+    assert columns.max() <= left + width
+    assert rows.min() >= top - 1
+    assert rows.max() <= top + height
+    assert width < 0.1 * SIZE[0]
 
 
 def test_containers_behind_a_nearer_one_are_left_out(scene):

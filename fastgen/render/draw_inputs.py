@@ -94,6 +94,11 @@ class Regions:
         """Disjoint rectangles that geometry may touch."""
         return bands([*self.surfaces, *self.near_damage])
 
+    def within(self, part: Region) -> "Regions":
+        """Return what of these regions is in a part of the image."""
+        every = self.surfaces, self.near_damage, self.holes, self.cables
+        return Regions(*(within(each, part) for each in every))
+
 
 def pixel_mm(mesh: Mesh, view: View) -> float:
     """Return the width in mm of a pixel on the nearest part of a mesh's bounding box."""

@@ -183,8 +183,10 @@ class Renderer:
         if plan is not None:
             self._ground.run(inputs, prepared, plan)
         tiles = Tiles(view) if plan is None else plan.tiles
-        for member in visible_members(prepared.present, view, tiles):
-            inputs = self._inputs(member.prepared, view.in_frame(member.pose), options, around)
+        for member, part in visible_members(prepared.present, view, tiles):
+            own = view.in_frame(member.pose)
+            inputs = self._inputs(member.prepared, own, options, around)
+            inputs = replace(inputs, regions=inputs.regions.within(part))
             if inputs.regions.surfaces:
                 self._light(inputs, member, prepared, exposure)
                 self._geometry.run(inputs)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
 from fastgen.render.constants import TILE_PX
-from fastgen.render.regions import hull_corners
+from fastgen.render.regions import Region, hull_corners
 
 _FEW = 3
 """A body over at most so many tiles keeps all tiles of its rectangle."""
@@ -121,6 +121,13 @@ class Tiles:
         offset = normal_x * x + normal_y * y
         distance = np.stack([normal_x, normal_y], 1) @ corners.reshape(-1, 2).T - offset[:, None]
         return np.asarray(distance.reshape(-1, *corners.shape[:2]), np.float64)
+
+    def around(self, mask: Mask) -> Region:
+        """Return the smallest region that contains a set of tiles, at least one."""
+        rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+        left, right = self.columns_px[[columns[0], columns[-1] + 1]].tolist()
+        top, bottom = self.rows_px[[rows[0], rows[-1] + 1]].tolist()
+        return left, top, right - left, bottom - top
 
     def rectangles(self, mask: Mask) -> NDArray[np.int32]:
         """Return disjoint rectangles that cover a set of tiles.

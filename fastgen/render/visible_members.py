@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import inward_mm
 from fastgen.geometry.prepared_scene import Member
-from fastgen.render.regions import box_corners
+from fastgen.render.regions import Region, box_corners
 from fastgen.render.tiles import Tiles
 from fastgen.scene.boxes import OrientedBox, away_mm, back_to_front, rotation_of
 from fastgen.scene.damage_kinds import form_of
@@ -24,11 +24,13 @@ rays are at most 78 degrees off the axis."""
 Array = NDArray[np.float64]
 
 
-def visible_members(members: Sequence[Member], view: View, tiles: Tiles) -> list[Member]:
+def visible_members(
+    members: Sequence[Member], view: View, tiles: Tiles
+) -> list[tuple[Member, Region]]:
     """Return at least the containers that an image shows, in the order in which they are drawn.
 
     A container never hides one that comes later. Left out are containers outside of the image, and
-    those that nearer ones hide.
+    those that nearer ones hide. Outside of its region, a container is hidden as well.
 
     Args:
         members: Containers that are present.
@@ -40,12 +42,14 @@ def visible_members(members: Sequence[Member], view: View, tiles: Tiles) -> list
     """
     eye_mm = view.position_m / MM
     hidden = np.zeros(tiles.shape, bool)
-    found = []
+    found: list[tuple[Member, Region]] = []
     for number in reversed(back_to_front([each.box for each in members], eye_mm)):
         member = members[number]
-        # a spreader may be visible above its container
-        if member.prepared.spreader is not None or (_touched(member, tiles) & ~hidden).any():
-            found.append(member)
+        shown = _touched(member, tiles) & ~hidden
+        if member.prepared.spreader is not None:  # it may be visible above its container
+            shown[:] = True
+        if shown.any():
+            found.append((member, tiles.around(shown)))
             solid = solid_mm(member, eye_mm)
             if solid is not None:
                 hidden |= tiles.filled(solid[None])
