@@ -80,7 +80,7 @@ def test_boxes_touch_and_fill_the_tiles_whose_rays_they_meet(lens):
             met_tiles += len(np.unique(rows // TILE_PX * 100 + columns // TILE_PX))
             touched_tiles += mask.sum()
             beside += (view.to_view(body.corners_mm)[:, 2] < 0).any() and met.any()
-        filled = spread(tiles.filled(corners))
+        filled = spread(tiles.filled(corners).any(axis=0))
         assert any_met[filled].all()
         filled_pixels += filled.sum()
     assert touched_tiles < 1.2 * met_tiles

@@ -85,7 +85,7 @@ def ground_plan(
     masks = None
     eye_mm = view.position_m / MM
     solids = [solid for each in members if (solid := solid_mm(each, eye_mm)) is not None]
-    hidden = tiles.filled(np.reshape(solids, (-1, 8, 3)))
+    hidden = _any(tiles.filled(np.reshape(solids, (-1, 8, 3))))
     if props:
         parts = [prop_box(prop) for prop in props]
         seen_props = tiles.touched(np.stack([part.corners_mm for part in parts]))

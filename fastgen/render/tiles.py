@@ -74,16 +74,16 @@ class Tiles:
         return found
 
     def filled(self, points_mm: Array) -> Mask:
-        """Return tiles that the convex hull of one of several groups of points fills; bool [R, C].
+        """Return tiles that the convex hulls of groups of points fill; bool [N, R, C].
 
         Args:
             points_mm: Points [N, P, 3] in the world; a group in each row.
         """
-        found = np.zeros(self.shape, bool)
-        for part, hull in self._hulls(points_mm):
+        found = np.zeros((len(points_mm), *self.shape), bool)
+        for number, (part, hull) in enumerate(self._hulls(points_mm)):
             if hull is not None:
                 beyond = self._beyond(hull, part).max(axis=0)
-                found[part] |= np.logical_and.reduce(_corners(beyond < -self._margin))
+                found[number][part] = np.logical_and.reduce(_corners(beyond < -self._margin))
         return found
 
     def _hulls(self, points_mm: Array) -> Iterator[tuple[tuple[slice, slice], Array | None]]:

@@ -43,16 +43,21 @@ def visible_members(
     eye_mm = view.position_m / MM
     hidden = np.zeros(tiles.shape, bool)
     found: list[tuple[Member, Region]] = []
+    # all containers at once, because NumPy is slow for few points
+    touched = tiles.touched(np.reshape([_bounds_mm(each) for each in members], (-1, 8, 3)))
+    solids = [solid_mm(each, eye_mm) for each in members]
+    filled = tiles.filled(
+        np.reshape([np.zeros((8, 3)) if each is None else each for each in solids], (-1, 8, 3))
+    )
     for number in reversed(back_to_front([each.box for each in members], eye_mm)):
         member = members[number]
-        shown = _touched(member, tiles) & ~hidden
+        shown = touched[number] & ~hidden
         if member.prepared.spreader is not None:  # it may be visible above its container
             shown[:] = True
         if shown.any():
             found.append((member, tiles.around(shown)))
-            solid = solid_mm(member, eye_mm)
-            if solid is not None:
-                hidden |= tiles.filled(solid[None])
+            if solids[number] is not None:
+                hidden |= filled[number]
     return found[::-1]
 
 
@@ -71,10 +76,9 @@ def solid_mm(member: Member, eye_mm: Array) -> Array | None:
     return OrientedBox(member.box.center_mm, half, member.box.rotation).corners_mm
 
 
-def _touched(member: Member, tiles: Tiles) -> NDArray[np.bool_]:
-    """Return at least the tiles [R, C] that a container without its spreader touches."""
+def _bounds_mm(member: Member) -> Array:
+    """Return the corners [8, 3] of a box around a container without its spreader."""
     own = member.prepared
     corners_mm = box_corners(own.container.bounds_mm, own.scene.damages)
-    in_world_mm = corners_mm @ rotation_of(member.pose).T + member.pose.position_mm
-    found: NDArray[np.bool_] = tiles.touched(in_world_mm[None])[0]
+    found: Array = corners_mm @ rotation_of(member.pose).T + member.pose.position_mm
     return found
