@@ -54,6 +54,18 @@ def test_a_new_loader_in_each_epoch_goes_on_to_the_next(make, workers):
 
 
 @pytest.mark.parametrize("make", [dataset, stream])
+@pytest.mark.parametrize("workers", [0, 2])
+def test_a_loaded_position_is_not_used_in_another_epoch(make, workers):
+    """Another loader has taken the pass of the loaded epoch in the meantime."""
+    data = make()
+    loader = Loader(data, batch_size=4, num_workers=workers)
+    next(iter(loader))
+    loader.load_state_dict({**loader.state_dict(), "epoch": 5, "position": 8})
+    assert set(next(iter(Loader(data, batch_size=4)))[0]) == {5}
+    assert passes(loader, 1) == [in_epoch(6)]
+
+
+@pytest.mark.parametrize("make", [dataset, stream])
 def test_a_pass_that_was_left_early_counts_and_one_without_a_batch_does_not(make):
     loader = Loader(make(), batch_size=4)
     iter(loader)

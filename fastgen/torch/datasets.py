@@ -152,12 +152,12 @@ class ContainerDataset(Dataset[Item]):
     def begin_pass(self) -> None:
         """Go to the next epoch, unless one was set since the last pass over the data.
 
-        Samplers and streaming loaders call this, so a new loader continues where the last one was.
+        ShardSampler calls this when a pass begins, and Loader does so for a stream.
         """
         if not self._epoch_chosen:
             self.set_epoch(self.epoch + 1)
         self._epoch_chosen = False
-        self._taken[0] = 0
+        self._taken[0] = 0  # single items may have been taken since set_epoch
 
     @property
     def collate(self) -> Collate:

@@ -17,7 +17,7 @@ from fastgen.validation import whole
 class ShardSampler(Sampler[int]):
     """Sampler of one rank. Each position occurs once over all ranks; none is repeated as padding.
 
-    Each pass over the dataset goes to its next epoch, unless `set_epoch` has chosen one.
+    Each pass goes to the dataset's next epoch, unless `set_epoch` was called since the last pass.
 
     Args:
         dataset: Its length, epoch and seed decide the positions.
@@ -26,8 +26,12 @@ class ShardSampler(Sampler[int]):
         world_size: Number of ranks; give both or neither.
         shuffle: Use a new order in each epoch, the same on all ranks.
 
+    Each rank needs a dataset of its own, because all passes over a dataset count.
+
     Attributes:
-        start: Place in this order where passes begin, counted over all ranks.
+        resume_at: Epoch, and the position in its order at which its pass begins, counted over all
+            ranks. Passes of other epochs begin at 0.
+        start: Where the last pass began.
     """
 
     def __init__(
@@ -38,7 +42,7 @@ class ShardSampler(Sampler[int]):
         shuffle: bool = False,
     ) -> None:
         shard(rank, world_size)  # refuses bad values here, not in a pass
-        self.start = 0
+        self.resume_at, self.start = (0, 0), 0
         self._dataset, self._shuffle = dataset, shuffle
         self._rank, self._world_size = rank, world_size
 
@@ -59,6 +63,8 @@ class ShardSampler(Sampler[int]):
     def __iter__(self) -> Iterator[int]:
         data = self._dataset
         data.begin_pass()
+        epoch, position = self.resume_at
+        self.start = position if epoch == data.epoch else 0
         places = range(len(data))
         if self._shuffle:
             order = stream(data.seed, data.epoch, "order").permutation(len(data)).tolist()
@@ -70,9 +76,9 @@ class ShardSampler(Sampler[int]):
 class Loader:
     """Batches of a ContainerDataset or ContainerStream, with a position that can be saved.
 
-    Each pass over the dataset goes to its next epoch, unless `set_epoch` has chosen one since the
-    last pass, which may have been that of another Loader. A pass counts as soon as it has delivered
-    a batch.
+    Each pass goes to the dataset's next epoch, unless `set_epoch` was called since the last pass.
+    All Loaders and ShardSamplers of a dataset count together. A pass counts as soon as it has
+    delivered a batch.
 
     `state_dict` counts the samples handed out, not those that workers have prepared. After
     `load_state_dict`, a Loader with the same dataset continues with the next sample. Batch size,
@@ -111,6 +117,12 @@ class Loader:
         world_size: int | None = None,
         **options: Any,
     ) -> None:
+        for name in ("sampler", "batch_sampler"):
+            if name in options:
+                raise ConfigError(
+                    f"{name}: a Loader divides the positions itself; leave it out, or give it to "
+                    "torch's own DataLoader"
+                )
         self.dataset = dataset
         self.batch_size, self.drop_last = whole("batch_size", batch_size, 1), drop_last
         self._shuffle = shuffle
@@ -127,12 +139,6 @@ class Loader:
             )
         else:
             self._items, self.sampler = dataset, ShardSampler(dataset, rank, world_size, shuffle)
-        for name in ("sampler", "batch_sampler"):
-            if name in options:
-                raise ConfigError(
-                    f"{name}: a Loader divides the positions itself; leave it out, or give it to "
-                    "torch's own DataLoader"
-                )
         self._length = dataset.length
         self._next_pass = (0, 0)  # epoch and first position; passes in other epochs begin at 0
         self._reached = (0, 0)  # epoch and position after the last sample
@@ -199,15 +205,18 @@ class Loader:
         return self._batches_in(0)
 
     def __iter__(self) -> Iterator[Any]:
-        start = self._in_this_epoch(self._next_pass)
-        self._next_pass = (0, 0)
+        resume_at, self._next_pass = self._next_pass, (0, 0)
+        start = 0
         if isinstance(self.sampler, ContainerStream):
             self._items.begin_pass()
+            start = self._in_this_epoch(resume_at)
             self.sampler.start_at(start)
         else:
-            self.sampler.start = start
+            self.sampler.resume_at = resume_at
         _, world_size = self.sampler.part
         for number, batch in enumerate(self._loader, start=1):
+            if isinstance(self.sampler, ShardSampler):
+                start = self.sampler.start
             position = start + number * self.batch_size * world_size
             if self._length is not None and number >= self._batches_in(start):
                 position = self._length
