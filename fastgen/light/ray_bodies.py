@@ -20,8 +20,8 @@ LIFT_MM = 1.0
 """Distance from a surface at which rays from it start."""
 
 _APART_MM = 8.0
-"""Largest distance of a visible point from its surface, see RayBodies.settled. A lens distorts only
-the corners of triangles, so points of far walls are up to 5 mm off."""
+"""Largest distance over which `settled` moves a point. A lens distorts only the corners of
+triangles, so points on far walls are up to 5 mm off."""
 
 
 def check_rays() -> None:
@@ -120,9 +120,9 @@ class RayBodies:
         return which, radiance
 
     def settled(self, place_mm: Floats, normal: Floats) -> Floats:
-        """Return places [K, 3] near surfaces with unit normals [K, 3], moved along these onto them.
+        """Return points [K, 3] moved along their unit normals [K, 3] onto the nearest surface.
 
-        Those farther than _APART_MM from a surface stay.
+        Points farther than _APART_MM from any surface stay.
         """
         if not len(place_mm):
             return place_mm

@@ -138,9 +138,14 @@ def visible_share(values: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def narrowed_cones(cones: NDArray[np.uint8], left: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Return cones uint8 [V, 3], see `encoded_cones`, of which only a share [V] is left."""
+    """Return cones uint8 [V, 3] after other objects have hidden part of their sky.
+
+    Args:
+        cones: uint8 [V, 3], see `encoded_cones`.
+        left: Share [V] of the cosine-weighted visible sky that is left, 0 to 1.
+    """
     toward, length = _decoded(cones)
-    rim = np.sqrt(1 - left * visible_share(cones))
+    rim = np.sqrt(np.clip(1 - left * visible_share(cones), 0, 1))
     scale = 127 * (1 - rim / 2) / length
     return np.asarray(np.rint(128 + toward * scale).T, np.uint8)
 

@@ -15,8 +15,9 @@ LIFT_MM = 5.0
 _STEP_MM = 1000.0
 """Largest distance between points on a face of the outer box."""
 
-_NORMAL_COUNTS_MM = 150.0
-"""Distance that counts as much as one in the cosine to a side: the depth of rails and recesses."""
+_NORMAL_WEIGHT_MM = 150.0
+"""Distance that weighs as much as a difference of 1 in the cosine between normal and side. It is
+about the depth of rails and recesses."""
 
 _LEAST = 0.02
 """Least light of a vertex, relative to the open."""
@@ -73,7 +74,7 @@ class SurroundingLight:
         found = visibility.vertex_bytes(sky, self.vertex_light(values, light, mesh))
         nearest = np.take_along_axis(corner, weight.argmax(axis=0)[None], axis=0)[0]
         found[:, 8:] &= self.open_bits.take(nearest, axis=0)
-        # a roof under another container mirrors no sky; walls of an aisle mirror its open end
+        # walls keep their cones: they reflect the sky at the open end of an aisle
         up = np.flatnonzero(mesh.normals[:, 2] > 0.5)
         left = self.sky.mean(axis=1).take(nearest[up])
         found[up, :3] = narrowed_cones(found[up, :3], left)
@@ -153,14 +154,13 @@ def _lattice_places(mesh: Mesh) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
 
 
 def _sides_beside(mesh: Mesh) -> NDArray[np.intp]:
-    """Return the side [V] of the outer box that each vertex belongs to.
+    """Return the side [V] of the outer box whose light each vertex receives.
 
-    That is the nearest one, and of two near ones that which faces more along the normal. The
-    normal alone does not tell: the top of a wall's lower rail is in the shade of what stands beside
-    the wall, and not in that of the roof.
+    It is the nearest side. Between two near sides, the normal decides. The top of a lower rail
+    faces up, but the neighbour of its wall shades it.
     """
     low, high = (np.asarray(bound, np.float64) for bound in mesh.bounds_mm)
-    outward = mesh.positions_mm + _NORMAL_COUNTS_MM * mesh.normals
+    outward = mesh.positions_mm + _NORMAL_WEIGHT_MM * mesh.normals
     costs = [sign * ((high if sign > 0 else low)[axis] - outward[:, axis]) for axis, sign in FACES]
     return np.asarray(np.argmin(costs, axis=0))
 
