@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fastgen.camera.projection import view_of
-from fastgen.render.regions import bands, hull_corners, merged, outside, within
+from fastgen.render.regions import bands, grown, hull_corners, merged, outside, within
 from fastgen.scene import Camera
 from fastgen.scene.optics import Lens
 
@@ -33,6 +33,11 @@ def test_one_region_stays_whole_and_an_unknown_one_is_the_image():
     assert bands([(3, 4, 5, 6)]) == [(3, 4, 5, 6)]
     assert bands([(3, 4, 5, 6), (3, 10, 5, 2)]) == [(3, 4, 5, 8)]
     assert bands([(3, 4, 5, 6), None]) == [None]
+
+
+def test_a_grown_region_ends_at_the_border_of_the_image():
+    assert grown((10, 8, 4, 6), 2, (40, 30)) == (8, 6, 8, 10)
+    assert grown((0, 20, 38, 10), 4, (40, 30)) == (0, 16, 40, 14)
 
 
 def test_merged_regions_cover_all_and_no_pixel_twice():

@@ -129,6 +129,17 @@ def within(regions: Sequence[Region | None], other: Region) -> list[Region]:
     return found
 
 
+def grown(region: Region, margin_px: int, size: tuple[int, int]) -> Region:
+    """Return a region widened by a margin on all sides, within an image of (width, height) = size.
+
+    An even margin keeps the alignment to 2x2 pixel blocks.
+    """
+    x, y, width, height = region
+    wider = x - margin_px, y - margin_px, width + 2 * margin_px, height + 2 * margin_px
+    (inside,) = within([wider], (0, 0, *size))
+    return inside
+
+
 def around(regions: Sequence[Region]) -> Region:
     """Return the smallest region that contains all given regions, at least one."""
     left, top = (min(region[k] for region in regions) for k in (0, 1))

@@ -33,10 +33,12 @@ from fastgen.render.passes.bake import Atlas, bake_atlas, bake_program
 from fastgen.render.passes.geometry import GeometryPass
 from fastgen.render.passes.ground import GroundPass
 from fastgen.render.passes.normals import NormalsPass
+from fastgen.render.passes.ray_points import points_reach_px
 from fastgen.render.passes.shading import ShadingPass
 from fastgen.render.program import Programs, Read, shader_text
 from fastgen.render.ray_light import RayLight
 from fastgen.render.recent_targets import RecentTargets
+from fastgen.render.regions import grown
 from fastgen.render.scene_lights import Around, SceneLights
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
@@ -186,6 +188,8 @@ class Renderer:
         for member, part in visible_members(prepared.present, view, tiles):
             own = view.in_frame(member.pose)
             inputs = self._inputs(member.prepared, own, options, around)
+            if inputs.variant.traced:  # ray points beside a region light pixels in it
+                part = grown(part, points_reach_px(view.size), view.size)
             inputs = replace(inputs, regions=inputs.regions.within(part))
             if inputs.regions.surfaces:
                 self._light(inputs, member, prepared, exposure)

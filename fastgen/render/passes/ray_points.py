@@ -31,6 +31,15 @@ def point_step(size: tuple[int, int]) -> int:
     return math.ceil(math.sqrt(size[0] * size[1]) / _POINTS_PER_AXIS)
 
 
+def points_reach_px(size: tuple[int, int]) -> int:
+    """Return the distance in pixels, even, within which all points that light a pixel lie.
+
+    traced_light.glsl filters points up to 1.5 steps away. A point of another surface than the one
+    at the middle of its cell is up to two pixels farther away.
+    """
+    return 2 * point_step(size) + 2
+
+
 class RayPass:
     """Picks points from the visibility buffer, lights them with rays, and stores that light.
 
