@@ -195,6 +195,8 @@ def test_every_missing_or_foreign_part_is_named(full):
         (("weather", "visibility_mm"), -1.0),
         (("weather", "rain", "shutter_s"), 0.0),
         (("spreader", "gap_mm"), -5.0),
+        (("props", 0, "size_mm"), [100.0, 100.0, 100.0]),  # a list has no hash, see prop_box
+        (("props", 0, "pose", "position_mm"), [0.0, 0.0, -500.0]),
         (("index",), -1),
         (("seed",), 2**64),
     ],
