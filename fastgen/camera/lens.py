@@ -112,7 +112,7 @@ class Distortion:
     def apply(self, ideal: ArrayLike) -> Array:
         """Return the distorted positions of ideal points [..., 2]."""
         points = np.asarray(ideal, np.float64)
-        # NumPy is slow along an axis of two
+        # NumPy is slow along short axes
         x, y = np.ascontiguousarray(points[..., 0]), np.ascontiguousarray(points[..., 1])
         radius = np.sqrt(x * x + y * y)
         t = np.arctan(radius) if self._fisheye else radius

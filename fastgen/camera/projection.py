@@ -78,7 +78,7 @@ class View:
         # one product, because NumPy multiplies a stack of small matrices one by one
         turned = points.reshape(-1, 3) @ (MM * self.rotation.T)
         for axis, offset in enumerate(self.rotation @ self.position_m):
-            turned[:, axis] -= offset  # NumPy is slow along an axis of three
+            turned[:, axis] -= offset  # NumPy is slow along short axes
         return turned.reshape(points.shape)
 
     def project(

@@ -100,7 +100,7 @@ def pixels_beyond(facets: Facets, view: View) -> Array:
     """Return image positions [P, 2] of all corners of the part of facets beyond the near plane."""
     distance = view.to_view(facets.points_mm)[:, 2] - NEAR_M
     pixels, _ = view.project(facets.points_mm.compress(distance >= 0, axis=0))
-    # NumPy is slow along an axis of three
+    # NumPy is slow along short axes
     before = [(distance < 0).take(corner) for corner in facets.corners.T]
     crossing = np.logical_or.reduce(before) & ~np.logical_and.reduce(before)
     cut = replace(facets, corners=facets.corners.compress(crossing, axis=0)).beyond(distance)

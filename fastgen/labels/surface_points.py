@@ -49,7 +49,7 @@ class Points:
         facet, depth_m = self.facet.take(which), self.depth_m.take(which)
         right, down = self.away.take(which, axis=1)
         found = np.empty((len(which), 3))
-        for axis in range(3):  # NumPy is slow along an axis of three
+        for axis in range(3):  # NumPy is slow along short axes
             at, by_right, by_down = self.plane[:, :, axis].T.copy()
             over_depth = at.take(facet) + right * by_right.take(facet) + down * by_down.take(facet)
             np.multiply(over_depth, depth_m, out=found[:, axis])

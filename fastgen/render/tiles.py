@@ -111,7 +111,7 @@ class Tiles:
         Returns:
             Signed distances [E, rows + 1, columns + 1] in the plane.
         """
-        # NumPy is slow along an axis of two
+        # NumPy is slow along short axes
         x, y = hull.T
         right, down = (np.append(side[1:], side[0]) - side for side in (x, y))
         length = np.maximum(np.sqrt(right * right + down * down), 1e-12)

@@ -68,7 +68,7 @@ class OrientedBox:
         way = way_mm @ self.rotation
         way = np.where(np.abs(way) < 1e-9, 1e-9, way)
         middle, reach = -start / way, self.half_mm / np.abs(way)
-        # a reduction over an axis of three takes several times as long
+        # NumPy is slow along short axes
         x, y, z = np.moveaxis(middle - reach, -1, 0)
         far_x, far_y, far_z = np.moveaxis(middle + reach, -1, 0)
         enters, leaves = (
