@@ -19,7 +19,7 @@ struct NoiseSample {
 // tile_mm: Side of a noise tile on the surface. footprint_mm: Width of the lookup on the surface.
 // The mip level's texels are at most as wide as the footprint, because bilinear filtering widens them.
 NoiseSample read_noise(int layer, vec2 noise_mm, float tile_mm, float footprint_mm) {
-    // The exponent of a number is floor(log2()) of it.
+    // The exponent bits of a positive float are floor(log2(x)) + 127.
     int exponent = (floatBitsToInt(footprint_mm * NOISE_SIZE / tile_mm) >> 23) - 127;
     int level = clamp(exponent, 0, NOISE_LEVELS - 1);
     vec4 value = textureLod(noise_tiles, vec3(noise_mm / tile_mm, layer), float(level));

@@ -59,7 +59,7 @@ VIEWS = {
 
 @pytest.fixture(scope="module")
 def row_of_containers(generator) -> Scene:
-    """Containers of which some are hidden in part, some altogether, and some out of sight."""
+    """Containers that are partly hidden, fully hidden or outside the image."""
     first: Scene = generator.scene(0)
     places = ((3000.0, 12000.0), (-2500.0, 6000.0), (0.0, 18000.0), (60000.0, 0.0))
     others = tuple(

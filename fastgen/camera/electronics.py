@@ -60,19 +60,22 @@ def noisy(
     Args:
         light: float32 [H, W, 3].
         noise: Parameters of the sensor.
-        gain: Amplification.
+        gain: Sensor gain, 1 at base ISO.
         raw: Source of random numbers, for bands of one image; by default a new one with the seed of
             `noise`.
+
+    Returns:
+        float32 [H, W, 3]. Read noise may make dark pixels negative.
     """
     well = np.float32(noise.full_well_e / gain)
-    spread = np.maximum(light, 0)
-    spread *= well
-    spread += np.float32(noise.read_noise_e**2)
-    np.sqrt(spread, out=spread)
-    spread *= _standard_normal(raw or np.random.SFC64(noise.seed), light.shape)
-    spread *= 1 / well
-    spread += light
-    return spread
+    result = np.maximum(light, 0)
+    result *= well
+    result += np.float32(noise.read_noise_e**2)
+    np.sqrt(result, out=result)
+    result *= _standard_normal(raw or np.random.SFC64(noise.seed), light.shape)
+    result *= 1 / well
+    result += light
+    return result
 
 
 def _standard_normal(raw: np.random.SFC64, shape: tuple[int, ...]) -> Light:

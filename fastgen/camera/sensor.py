@@ -142,7 +142,18 @@ def _blurred(light: Light, frame: Frame, camera: Camera, exposure: Exposure) -> 
 
 
 def _developed(light: Light, sensor: Sensor, gain: float) -> NDArray[np.uint8]:
-    """Return the image of blurred light, by the effects that treat each pixel for itself."""
+    """Return the encoded image after vignetting, noise, gains and tone curve.
+
+    These treat each pixel independently.
+
+    Args:
+        light: float32 [H, W, 3], blurred linear light.
+        sensor: Parameters of the sensor.
+        gain: Sensor gain, 1 at base ISO.
+
+    Returns:
+        uint8 [H, W, 3], sRGB.
+    """
     height, width = light.shape[:2]
     times = np.float32(2.0**sensor.exposure_error_ev)
     factor = np.full((height, width), times)
@@ -153,7 +164,7 @@ def _developed(light: Light, sensor: Sensor, gain: float) -> NDArray[np.uint8]:
     image = np.empty(light.shape, np.uint8)
     for top in range(0, height, _BAND_ROWS):
         rows = slice(top, top + _BAND_ROWS)
-        part = light[rows] * cv2.merge([factor[rows]] * 3)  # NumPy is slow along an axis of three
+        part = light[rows] * cv2.merge([factor[rows]] * 3)  # NumPy is slow along short axes
         if sensor.noise:
             part = noisy(part, sensor.noise, gain, raw)
         if sensor.gains != (1, 1, 1):

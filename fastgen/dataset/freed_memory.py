@@ -1,4 +1,4 @@
-"""How much freed memory a process keeps, and its return to the operating system.
+"""Limits of the freed memory that a process keeps, and its return to the operating system.
 
 glibc keeps freed blocks that lie between blocks in use. Frames and label files differ in size, so
 over thousands of images these gaps spread over more and more pages without more memory in use.
@@ -25,7 +25,7 @@ def keep_freed_memory() -> None:
     """Keep the memory of an image's arrays for those of the next image.
 
     By default, glibc returns it after each image. The system then clears some thousand pages again.
-    C libraries without mallopt, such as musl, do nothing.
+    Has no effect with C libraries that lack the function, such as musl.
     """
     if _mallopt is not None:
         _mallopt(_MMAP_THRESHOLD, _MAPPED_BYTES)
@@ -35,7 +35,7 @@ def keep_freed_memory() -> None:
 def return_freed_memory() -> None:
     """Return free pages to the system, which takes about 2 ms; see malloc_trim(3).
 
-    C libraries without this function, such as musl, do nothing.
+    Has no effect with C libraries that lack the function, such as musl.
     """
     if _malloc_trim is not None:
         _malloc_trim(0)

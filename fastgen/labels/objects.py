@@ -189,8 +189,7 @@ def _container(shot: Shot) -> Object:
 
 
 def _unseen(shot: Shot, corners: NDArray[np.float64], passes_camera: bool) -> tuple[int, int]:
-    """Count the hidden pixels of the container's box with these corners, and those outside the
-    image.
+    """Count the pixels of the container's box that are hidden, and that are outside the image.
 
     Args:
         shot: The image.

@@ -48,18 +48,18 @@ class Shot:
     def of_member(self, member: Member) -> "Shot":
         """Return the image with one container of its scene alone, in the frame of the container."""
         damage = self.frame.damage
-        mine = self._whose == member.number + 1
+        mine = self._owner == member.number + 1
         return Shot(
             replace(self.frame, damage=np.asarray(cv2.copyTo(damage, mine.view(np.uint8)))),
             member.prepared,
             self.view.in_frame(member.pose),
             self.config,
-            (self._whose > 0) & ~mine,
+            (self._owner > 0) & ~mine,
             self.prepared.others[member.number],
         )
 
     @cached_property
-    def _whose(self) -> NDArray[np.uint8]:
+    def _owner(self) -> NDArray[np.uint8]:
         """Number of the container that each pixel [H, W] shows, plus 1; 0 for everything else."""
         damage = self.frame.damage
         numbers = np.zeros(max(int(damage.max()), *DAMAGE_VALUES) + 1, np.uint8)

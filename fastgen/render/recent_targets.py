@@ -39,9 +39,9 @@ class RecentTargets:
 
     def samples(self, size: tuple[int, int], per_axis: int) -> VisibilityBuffer:
         """Return the visibility buffer of images of a size with so many samples per axis."""
-        part = per_axis > self._quality.samples_per_axis
+        starts_small = per_axis > self._quality.samples_per_axis
         return self._samples.get(
-            (size, per_axis), lambda: VisibilityBuffer(self._gl, size, per_axis, part)
+            (size, per_axis), lambda: VisibilityBuffer(self._gl, size, per_axis, starts_small)
         )
 
     def release(self) -> None:

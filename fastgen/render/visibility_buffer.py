@@ -39,7 +39,11 @@ class VisibilityBuffer:
     """
 
     def __init__(
-        self, gl: GLContext, size: tuple[int, int], samples_per_axis: int, part: bool = False
+        self,
+        gl: GLContext,
+        size: tuple[int, int],
+        samples_per_axis: int,
+        starts_small: bool = False,
     ) -> None:
         """Prepare the buffer of (width, height) = size images.
 
@@ -47,8 +51,8 @@ class VisibilityBuffer:
             gl: Current context.
             size: Image size in pixels.
             samples_per_axis: As many as sample_lattice.fitting allows, or fewer.
-            part: Images use the buffer for some of their containers only, which rarely reach the
-                lower edge, so it begins with the rows that are needed.
+            starts_small: Begin with the rows that the first scene needs, instead of those of a
+                whole image. It suits containers that rarely reach the lower edge of an image.
         """
         self._ctx = gl.ctx
         self._size = size
@@ -59,7 +63,8 @@ class VisibilityBuffer:
         assert row is not None, "more samples than `fitting` allows"
         self.inner_row = row
         self.to_clip = self._lattice.to_clip(size)
-        self._rows, self._least_rows = 0, 0 if part else self._fine[1]
+        self._rows = 0
+        self._least_rows = 0 if starts_small else self._fine[1]
         self._owned: list[Any] = []
         self._rest: list[moderngl.Texture] = []
         self._viewport = gl.function(
@@ -101,9 +106,9 @@ class VisibilityBuffer:
             holes: Regions that `limit_inside` will name.
             over: The surfaces are drawn over an image, which has its sky already.
         """
-        read = [*map(self._texels, seen), *map(self._texels_inside, holes)]
-        self._make_room(damage, max((top + height for _, top, _, height in read), default=1))
-        for box in read:
+        boxes = [*map(self._texels, seen), *map(self._texels_inside, holes)]
+        self._make_room(damage, max((top + height for _, top, _, height in boxes), default=1))
+        for box in boxes:
             self._clear(self._keys, box, NUMBERS, 0)
         # with single samples the depth separates sky from surfaces, see ImageTargets.begin
         outer = [None] if self.per_axis == 1 and not over else seen

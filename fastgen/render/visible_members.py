@@ -18,8 +18,8 @@ _SKIN_MM = 150.0
 """Depth below its outer box from which an undamaged container hides what is behind it."""
 
 _LEAST_AWAY_MM = 5 * NEAR_M / MM
-"""Distance of a container to the camera from which the near plane cuts off no visible part of it;
-rays are at most 78 degrees off the axis."""
+"""Shortest distance from camera to container at which the near plane cuts off no visible part. Rays
+are at most 78 degrees off the axis."""
 
 Array = NDArray[np.float64]
 
@@ -27,15 +27,18 @@ Array = NDArray[np.float64]
 def visible_members(
     members: Sequence[Member], view: View, tiles: Tiles
 ) -> list[tuple[Member, Region]]:
-    """Return at least the containers that an image shows, in the order in which they are drawn.
+    """Return every container that the image may show, with the region that may show it.
 
-    A container never hides one that comes later. Left out are containers outside of the image, and
-    those that nearer ones hide. Outside of its region, a container is hidden as well.
+    Containers outside the image or hidden by nearer ones are left out.
 
     Args:
         members: Containers that are present.
         view: Projection of the image, in the world frame.
         tiles: Its tiles.
+
+    Returns:
+        Containers from back to front, each with a region in pixels: x, y, width, height. Outside
+        its region a container is hidden.
 
     Raises:
         ConfigError: Containers hide one another in a circle.
