@@ -117,6 +117,21 @@ def test_workers_whose_parent_was_killed_end_silently(tmp_path):
     assert "Traceback" not in process.communicate(timeout=300)[1]
 
 
+def test_a_worker_ends_with_its_parent_although_one_forked_later_hangs(tmp_path):
+    out = tmp_path / "out"
+    process = begun(out)
+    wait_for(lambda: list(out.glob("shards/*.json")))
+    first, last = sorted(psutil.Process(process.pid).children(recursive=True), key=lambda p: p.pid)
+    last.suspend()
+    try:
+        process.kill()
+        wait_for(lambda: gone([first]))
+        assert not gone([last])
+    finally:
+        last.kill()
+    process.communicate(timeout=300)
+
+
 def test_a_run_stopped_by_sigterm_can_be_resumed(tmp_path):
     out = tmp_path / "out"
     process = begun(out, "16")

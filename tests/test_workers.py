@@ -88,15 +88,15 @@ class TellsItsParent:
         self._report("parent", os.getppid())
 
 
-def heard_from(setup):
-    """Return what a worker reports."""
+def heard_from(setup, count=1):
+    """Return what each of `count` workers reports about one task."""
     heard = []
 
     def on_death(task, place, ended):
         raise AssertionError(ended)
 
-    workers.run(setup, [1], 1, lambda _, value: heard.append(value), on_death)
-    return heard[0]
+    workers.run(setup, range(count), count, lambda _, value: heard.append(value), on_death)
+    return heard
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core has no matrix threads")
@@ -108,7 +108,7 @@ def test_workers_start_no_matrix_threads_unless_the_user_asks_for_them(variables
     names = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS")
     others = {name: value for name, value in os.environ.items() if name not in names}
     # a process of its own, because the server of workers keeps its number of threads
-    code = "from tests import test_workers as t; print(t.heard_from(t.TellsItsThreads))"
+    code = "from tests import test_workers as t; print(*t.heard_from(t.TellsItsThreads))"
     said = subprocess.run(
         [sys.executable, "-c", code], env={**others, **variables}, capture_output=True, check=True
     )
@@ -117,16 +117,21 @@ def test_workers_start_no_matrix_threads_unless_the_user_asks_for_them(variables
 
 FORKING = """
 import os, sys, threading
-from fastgen.dataset.workers import fork_from_here
-fork_from_here()
+from fastgen.dataset import workers
+workers.fork_from_here()
 from tests import test_workers as t
+thread = threading.Thread(target=threading.Event().wait, daemon=True)
 if "thread" in sys.argv:
-    threading.Thread(target=threading.Event().wait, daemon=True).start()
-print(t.heard_from(t.TellsItsParent) == os.getpid())
+    thread.start()
+if "thread of a module" in sys.argv:
+    workers.importlib.import_module = lambda _: thread.ident or thread.start()
+print(t.heard_from(t.TellsItsParent, 2).count(os.getpid()))
 """
 
 
-@pytest.mark.parametrize(("arguments", "here"), [([], "True"), (["thread"], "False")])
+@pytest.mark.parametrize(
+    ("arguments", "here"), [([], 2), (["thread"], 0), (["thread of a module"], 0)]
+)
 def test_a_command_without_threads_forks_workers_from_its_own_process(arguments, here):
     """The lock of a thread that a child lacks would stay locked."""
     names = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS")
@@ -134,13 +139,13 @@ def test_a_command_without_threads_forks_workers_from_its_own_process(arguments,
     said = subprocess.run(
         [sys.executable, "-c", FORKING, *arguments], env=unset, capture_output=True, check=True
     )
-    assert said.stdout.decode().strip() == here
+    assert int(said.stdout) == here
 
 
 SCRIPT = """
 from tests import test_workers
 if __name__ == "__main__":
-    print(test_workers.heard_from(test_workers.TellsItsVariable))
+    print(*test_workers.heard_from(test_workers.TellsItsVariable))
 """
 
 
@@ -177,7 +182,7 @@ def test_workers_have_the_environment_of_the_time_of_their_start(monkeypatch):
             monkeypatch.delenv("FASTGEN_TEST")
         else:
             monkeypatch.setenv("FASTGEN_TEST", value)
-        assert heard_from(TellsItsVariable) == value
+        assert heard_from(TellsItsVariable) == [value]
 
 
 @pytest.mark.parametrize("speaks", [True, False])

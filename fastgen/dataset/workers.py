@@ -3,8 +3,8 @@
 Each process has its own pipe. A shared queue has a lock, which stays locked if its holder dies.
 
 Workers are forked from a process that has imported the package, so they start at once and share
-the memory of its modules. That process has no other threads and no OpenGL context, because a child
-may hang otherwise. It is the process of the command itself, or for programs that call fastgen a
+the memory of its modules. That process must have no other threads and no OpenGL context; otherwise
+a child may hang. It is the process of the command itself, or for programs that call fastgen a
 server process.
 """
 
@@ -52,8 +52,8 @@ OpenBLAS reads them when NumPy is imported, which is before any of our code runs
 _WARM_START = "fastgen.dataset.warm_start"
 """Module that is imported before workers are forked."""
 
-_FORKING: set[int] = set()
-"""The ids of processes that workers may be forked from, see `fork_from_here`."""
+_forking_pid: int | None = None
+"""Process that workers may be forked from; see `fork_from_here`."""
 
 
 @contextlib.contextmanager
@@ -142,17 +142,24 @@ def fork_from_here() -> None:
 
     Call this before NumPy is imported. The process must not open OpenGL.
     """
+    global _forking_pid
     os.environ.update(_one_matrix_thread())
-    _FORKING.add(os.getpid())
+    _forking_pid = os.getpid()
+
+
+def _has_one_thread() -> bool:
+    """Return True if this process certainly has no other threads."""
+    # clients of object stores start threads; only Linux has this folder
+    tasks = Path("/proc/self/task")
+    return tasks.is_dir() and len(list(tasks.iterdir())) == 1
 
 
 def _context() -> ForkContext | ForkServerContext | SpawnContext:
     """Return how a worker starts."""
-    tasks = Path("/proc/self/task")
-    # object stores start threads, and other systems have no such folder
-    if os.getpid() in _FORKING and tasks.is_dir() and len(list(tasks.iterdir())) == 1:
+    if os.getpid() == _forking_pid and _has_one_thread():
         importlib.import_module(_WARM_START)
-        return multiprocessing.get_context("fork")
+        if _has_one_thread():  # an imported module may have started threads
+            return multiprocessing.get_context("fork")
     if start_server():
         return multiprocessing.get_context("forkserver")
     return multiprocessing.get_context("spawn")
@@ -189,7 +196,8 @@ class _Worker:
     def __init__(self, setup: Setup) -> None:
         context = _context()
         self.pipe, theirs = context.Pipe()
-        arguments = theirs, setup, dict(os.environ)
+        forked = context.get_start_method() == "fork"
+        arguments = theirs, setup, dict(os.environ), forked
         self.process = context.Process(target=_work, args=arguments, name=_NAME, daemon=True)
         with _started_quietly():
             self.process.start()
@@ -214,8 +222,8 @@ class _Worker:
 def end_unguarded_worker() -> None:
     """End this process if it is a worker. A run calls this before it starts workers of its own.
 
-    A new process imports the main script of its parent. Without a guard, the script would start a
-    run in each worker.
+    A process that was spawned, or forked from the server, imports the main script. Without a guard,
+    the script would start a run in each worker.
     """
     if multiprocessing.current_process().name == _NAME:
         os._exit(_UNGUARDED)  # a forked process turns SystemExit into exit code 1
@@ -309,15 +317,21 @@ def in_words(error: Exception, place: str) -> str:
     return f"{place}: {error!r} (this is a bug in fastgen: please report it)"
 
 
-def _work(pipe: Connection, setup: Setup, environment: Mapping[str, str]) -> None:
-    """Main function of a worker: do tasks from the pipe until the parent kills it or exits."""
+def _work(pipe: Connection, setup: Setup, environment: Mapping[str, str], forked: bool) -> None:
+    """Main function of a worker: do tasks from the pipe until the parent kills it or exits.
+
+    Args:
+        pipe: Receives tasks and sends reports.
+        setup: Returns the function that does a task.
+        environment: Environment variables of the parent.
+        forked: True if this process was forked from the parent, not from the server.
+    """
     os.environ.clear()  # the server may have started with other variables
     os.environ.update(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if signal.getsignal(signal.SIGTERM) != signal.SIG_IGN:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)  # not the handler of a forked process
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # a forked worker has the handler of the command
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(forked,), daemon=True).start()
     place = "start"
 
     def send(kind: str, value: Any) -> None:
@@ -350,9 +364,14 @@ def _gone_with_parent() -> Iterator[None]:
         os._exit(1)
 
 
-def _end_with_parent() -> None:
-    """Exit at once when the parent dies."""
+def _end_with_parent(forked: bool) -> None:
+    """Exit when the parent dies: at once, or within _POLL_S if later workers are still running.
+
+    Workers that are forked later inherit the parent's end of the pipe that reports its death, so
+    the pipe stays open until they have exited too. One of them may hang.
+    """
     parent = multiprocessing.parent_process()
     assert parent is not None
-    parent.join()
+    while parent.is_alive() and not (forked and os.getppid() != parent.pid):
+        parent.join(_POLL_S)
     os._exit(1)
