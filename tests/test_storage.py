@@ -56,6 +56,32 @@ def test_each_scene_and_each_image_is_reported_once(tmp_path):
     assert not heard
 
 
+def test_locks_are_forgotten_after_their_use(tmp_path):
+    for _ in range(2):
+        with Folder(tmp_path).locked():
+            assert len(storage._locks) == 1
+    assert len(storage._locks) == 0
+
+
+FORKING = """
+import os, sys
+from pathlib import Path
+from fastgen.dataset.storage import Folder
+with Folder(Path(sys.argv[1])).locked():
+    if os.fork() == 0:
+        sys.stdin.read()  # outlives the parent
+    os._exit(0)  # as if killed
+"""
+
+
+def test_a_forked_process_that_outlives_the_run_does_not_keep_the_lock(tmp_path):
+    command = [sys.executable, "-c", FORKING, str(tmp_path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+        process.wait(timeout=300)
+        with Folder(tmp_path).locked():
+            pass
+
+
 def test_kills_at_random_moments_end_in_the_same_bytes(whole, tmp_path):
     rng = random.Random(4)
     out = tmp_path / "out"

@@ -11,6 +11,7 @@ import io
 import os
 import shutil
 import uuid
+import weakref
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -31,9 +32,21 @@ LOCK = ".lock"
 _RECOVERED = "lost+found"
 """Folder that some file systems put into the root of a volume."""
 
-
 _LARGEST_READ, _LARGEST_HASHED = 4 << 30, 256 << 30
 """Largest files in bytes. Tar files, which may be larger than memory, are only hashed."""
+
+
+_locks: weakref.WeakSet[io.FileIO] = weakref.WeakSet()
+"""Lock files that this process has open."""
+
+
+def _close_locks() -> None:
+    for stream in list(_locks):
+        stream.close()
+
+
+# a forked worker that outlives the command would keep the folder locked
+os.register_at_fork(after_in_child=_close_locks)
 
 
 class UnreadableError(OutputError):
@@ -194,7 +207,7 @@ class Folder:
         path = self.root / LOCK
         with _named(path, "written"):
             stream = open_lock(path)
-        os.register_at_fork(after_in_child=stream.close)  # a worker must not hold the lock
+        _locks.add(stream)
         with stream:
             try:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
