@@ -260,6 +260,7 @@ def test_a_log_of_the_command_has_plain_lines_about_each_stage(tmp_path, capsys,
 
 def test_the_command_refuses_before_it_renders(tmp_path, capsys):
     folder = photographs_in(tmp_path / "photos", 2)
+    (folder / "1.png").write_bytes(b"no picture")  # too few are refused before any is read
     (tmp_path / "port.yaml").write_text("mine")
     for arguments, words in (
         ([], "port.yaml: exists; give another name with -o, or --force"),
@@ -271,7 +272,7 @@ def test_the_command_refuses_before_it_renders(tmp_path, capsys):
         assert words in capsys.readouterr().err
     assert main(["fit", str(folder), "-o", str(tmp_path / "port.yaml"), "--force"]) == 2
     assert capsys.readouterr().err == (
-        "fastgen: photographs: 2 cannot be compared with renders; give at least 3, or better 20\n"
+        f"fastgen: {folder}: has 2 photographs, too few to compare; give at least 3, or better 20\n"
     )
     assert (tmp_path / "port.yaml").read_text() == "mine"
 

@@ -88,7 +88,7 @@ class _Stages:
 def _fit(options: argparse.Namespace) -> int:
     # here because scipy.stats takes a second to import
     from fastgen.fit.boxes import read_box_heights
-    from fastgen.fit.gap import table
+    from fastgen.fit.gap import FEWEST, table
     from fastgen.fit.photographs import read_photographs
     from fastgen.fit.proposal import TRIALS_PER_MINUTE, Effort, propose
     from fastgen.fit.search import optimizer
@@ -104,7 +104,7 @@ def _fit(options: argparse.Namespace) -> int:
     check_folder(options.file)
     optimizer()  # refuses a missing one before minutes of rendering
     preset = Config.preset(options.preset)
-    photographs = read_photographs(options.photos, options.longest)
+    photographs = read_photographs(options.photos, options.longest, FEWEST)
     boxes = read_box_heights(options.photos, photographs)
     effort = Effort(max(round(TRIALS_PER_MINUTE * options.budget), 12))
     stages = _Stages()

@@ -122,9 +122,9 @@ def decode(data: bytes) -> NDArray[Any]:
     try:
         return iio.imread(data, plugin="pillow")
     except (OSError, SyntaxError) as error:
-        if error.__cause__ is None:  # Pillow's own words
+        if error.__cause__ is None:  # raised by Pillow itself
             raise ValueError(f"not a complete image ({error})") from None
-        # the words of imageio are about its plugins
+        # imageio's message lists its plugins, which does not help the user
         large = isinstance(error.__cause__, DecompressionBombError)
         reason = "too many pixels" if large else "not an image of a known type, or cut short"
         raise ValueError(reason) from None

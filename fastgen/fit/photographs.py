@@ -33,16 +33,17 @@ class Photograph(NamedTuple):
     pixels: Pixels
 
 
-def read_photographs(folder: Path, longest: int) -> list[Photograph]:
+def read_photographs(folder: Path, longest: int, fewest: int = 1) -> list[Photograph]:
     """Return the photographs directly in a folder, sorted by name.
 
     Args:
         folder: Folder with files of type JPEG, PNG, WebP, BMP or TIFF. Hidden files are ignored.
         longest: Longer side in pixels that larger photographs are scaled down to.
+        fewest: Number of photographs that the folder must have.
 
     Raises:
-        AssetError: The folder is missing or has no photograph, or one cannot be read or is smaller
-            than 64 pixels.
+        AssetError: The folder is missing or has too few photographs, or one cannot be read or is
+            smaller than 64 pixels.
     """
     if not folder.is_dir():
         wrong = "is a file, not a folder" if folder.exists() else "no such folder"
@@ -56,12 +57,18 @@ def read_photographs(folder: Path, longest: int) -> list[Photograph]:
         raise AssetError(
             f"{folder}: no photograph in this folder; give one with {', '.join(_TYPES)}"
         )
+    if len(found) < fewest:
+        count = "1 photograph" if len(found) == 1 else f"{len(found)} photographs"
+        raise AssetError(
+            f"{folder}: has {count}, too few to compare; give at least {fewest}, or better 20"
+        )
     return [_read(path, longest) for path in found]
 
 
 def _read(path: Path, longest: int) -> Photograph:
     try:
-        with warnings.catch_warnings(action="ignore"):  # of Pillow, about damage and large files
+        # Pillow warns about damaged and large files; the error below says so
+        with warnings.catch_warnings(action="ignore"):
             pixels = _as_rgb(decode(read_plain(path, LARGEST_FILE)))
     except (OSError, ValueError) as error:
         words = error.strerror if isinstance(error, OSError) else error

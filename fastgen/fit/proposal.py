@@ -102,16 +102,16 @@ def propose(
         effort: Amount of rendering and searching.
         seed: Seed of scenes and optimizer; the same seed gives the same proposal.
         boxes: Heights of containers in photographs, if known.
-        on_step: Called at the start of each stage, and after each of its photographs, pictures,
-            scenes or trials.
+        on_step: Called at the start of each stage, after each photograph, picture or scene, and
+            after each generation of trials.
 
     Raises:
         AssetError: There are too few photographs.
     """
     if len(photographs) < FEWEST:
         raise AssetError(
-            f"photographs: {len(photographs)} cannot be compared with renders; give at least "
-            f"{FEWEST}, or better 20"
+            f"photographs: {len(photographs)} are too few to compare; give at least {FEWEST}, or "
+            "better 20"
         )
     values: dict[str, Any] = {}
     reasons: dict[str, str] = {}
