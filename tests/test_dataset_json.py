@@ -102,7 +102,7 @@ def test_shards_without_dataset_json_tell_which_options_to_repeat(copy, capsys, 
     assert content(copy) == before
 
 
-def test_the_number_of_scenes_in_a_single_shard_is_told_by_its_images(tmp_path, capsys):
+def test_the_number_of_scenes_in_a_single_shard_follows_from_its_images(tmp_path, capsys):
     assert run(tmp_path, "--shard", "3") == 0
     (tmp_path / "dataset.json").unlink()
     assert run(tmp_path) == 2

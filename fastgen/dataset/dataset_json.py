@@ -9,7 +9,7 @@ import reprlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fastgen.dataset.job import Job, manifest_path, shard_of
+from fastgen.dataset.job import STEM_PATTERN, Job, manifest_path, shard_of
 from fastgen.dataset.manifest_types import Shard, parsed_json, unfit, unfit_finished
 from fastgen.dataset.seal import digest, is_sealed
 from fastgen.dataset.storage import Storage, UnreadableError
@@ -27,10 +27,7 @@ _SHOWN = 10
 """Number of differing settings that an error message lists with their values."""
 
 _LOOKED_AT = 100
-"""Number of shards whose images are looked at to find out settings."""
-
-_STEM = re.compile("(?:s([0-9]{1,18})_)?([0-9]{6,18})_(.+)")
-"""Stem of an image; its groups are the seed, the scene's index and the camera."""
+"""Largest number of shard manifests that are read to guess settings."""
 
 _OPTIONS = {
     "format": ("--format",),
@@ -103,17 +100,18 @@ def existing(storage: Storage, job: Job, settings: Mapping[str, Any]) -> dict[st
 
 
 def _likely_settings(storage: Storage, settings: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield settings with the seed, size, cameras and scenes per shard that shards show.
+    """Yield settings that the run may have had.
 
-    The other settings are as given, except the quality, which can be any.
+    Seed, size, cameras and scenes per shard are as its shards show them. Each quality is tried, and
+    all other settings are as given.
     """
     manifests = (read_manifest(storage, shard) for shard in shard_numbers(storage)[:_LOOKED_AT])
     records = [(each["shard"], record) for each in manifests if each for record in each["records"]]
-    named = [(shard, record, _STEM.fullmatch(record["stem"])) for shard, record in records]
-    images = [(shard, int(stem[2]), stem[3]) for shard, _, stem in named if stem]
+    stems = [(shard, re.fullmatch(STEM_PATTERN, record["stem"])) for shard, record in records]
+    images = [(shard, int(stem["scene"]), stem["camera"]) for shard, stem in stems if stem]
     if not images:
         return
-    seeds = [int(stem[1]) for *_, stem in named if stem and stem[1]]
+    seeds = [int(stem["seed"]) for _, stem in stems if stem and stem["seed"]]
     least = max(scene // (shard + 1) + 1 for shard, scene, _ in images)
     most = min((scene // shard for shard, scene, _ in images if shard), default=least)
     old = {

@@ -22,8 +22,8 @@ STEMS = ("seed", "short")
 COCO_MASKS = ("polygon", "rle")
 """Ways to write the masks of COCO annotations that are not crowds."""
 
-STEM_PATTERN = r"(?:s[0-9]+_)?([0-9]{6,})_([A-Za-z0-9_-]{1,64})"
-"""Stem of an image with either kind of name; its groups are the scene's index and the camera."""
+STEM_PATTERN = "(?:s(?P<seed>[0-9]{1,19})_)?(?P<scene>[0-9]{6,19})_(?P<camera>[A-Za-z0-9_-]{1,64})"
+"""Stem of an image with either kind of name. Seeds and indices of scenes are below 2^63."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def scene_and_camera(stem: str) -> tuple[int, str]:
     found = re.fullmatch(STEM_PATTERN, stem)
     if found is None:
         raise ValueError(f"{stem!r} is not the name of an image")
-    return int(found[1]), found[2]
+    return int(found["scene"]), found["camera"]
 
 
 def manifest_path(shard: int) -> str:
