@@ -51,7 +51,7 @@ def dataset(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """Dataset of so many shards that a run is far from its end when the first of them exist."""
+    """Dataset with many shards, so that a run is far from its end when its first shards exist."""
     out = tmp_path_factory.mktemp("whole") / "dataset"
     assert run(out, *MANY) == 0
     return out
@@ -63,8 +63,10 @@ def begun(out):
     process = interruptible(
         [*command, "--workers", "2"], stderr=subprocess.PIPE, start_new_session=True
     )
+    deadline = time.monotonic() + 300
     while len(list(out.glob("shards/*.json"))) < 2:
         assert process.poll() is None  # a finished run cannot be stopped
+        assert time.monotonic() < deadline
         time.sleep(0.01)
     return process
 
@@ -200,7 +202,7 @@ def test_a_killed_run_is_finished_to_the_same_bytes(dataset, whole, tmp_path):
     out = tmp_path / "out"
     process = begun(out)
     os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    process.communicate(timeout=300)
     assert "digest" not in json.loads((out / "dataset.json").read_text())
     assert run(out, *MANY) == 0
     assert content(out) == content(whole)

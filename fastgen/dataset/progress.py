@@ -47,16 +47,16 @@ class Progress:
         """Images counted so far, without those that existed."""
         return self._done - self._first
 
-    def add(self, images: int, note: str = "") -> None:
-        """Count `images` more, up to the total, and redraw when it is time.
+    def add(self, count: int, note: str = "") -> None:
+        """Count `count` more, up to the total, and redraw when it is time.
 
         Images of a worker that died are made again and count twice.
 
         Args:
-            images: Number of images that are done.
+            count: Number of things done since the last call.
             note: Words to show with the count.
         """
-        self._done = min(self._done + images, self._total)
+        self._done = min(self._done + count, self._total)
         self._note = note
         self._started = self._started or (time.monotonic(), self._done)
         self._draw_in_time()
