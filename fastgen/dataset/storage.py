@@ -35,7 +35,6 @@ _RECOVERED = "lost+found"
 _LARGEST_READ, _LARGEST_HASHED = 4 << 30, 256 << 30
 """Largest files in bytes. Tar files, which may be larger than memory, are only hashed."""
 
-
 _locks: weakref.WeakSet[io.FileIO] = weakref.WeakSet()
 """Lock files that this process has open."""
 
