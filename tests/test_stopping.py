@@ -143,6 +143,15 @@ def test_a_run_stopped_by_sigterm_can_be_resumed(tmp_path):
     assert main(["verify", str(out)]) == 0
 
 
+@pytest.fixture
+def ctrl_c():
+    """Let this process hear Ctrl-C, which a background job of a shell ignores."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("command", [*COMMANDS, "verify --repair"])
 def test_only_a_command_that_continues_its_work_asks_to_be_run_again(
