@@ -2,6 +2,8 @@
 
 import signal
 import subprocess
+import sys
+import time
 
 
 def interruptible(command, **options):
@@ -15,3 +17,21 @@ def interruptible(command, **options):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         **options,
     )
+
+
+def begun(out, *arguments, shards=0):
+    """Start `fastgen generate` in its own session, and return it once it has begun to write.
+
+    It has then written dataset.json and the manifests of so many shards.
+    """
+    process = interruptible(
+        [sys.executable, "-m", "fastgen", "generate", str(out), *arguments],
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 300
+    while not (out / "dataset.json").exists() or len(list(out.glob("shards/*.json"))) < shards:
+        assert process.poll() is None  # a finished run cannot be stopped
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return process

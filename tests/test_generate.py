@@ -5,9 +5,6 @@ import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import cv2
@@ -29,11 +26,12 @@ from fastgen.scene import Scene
 from tests.backends import needs_osmesa
 from tests.folders import content
 from tests.in_process import no_workers
-from tests.interruptible import interruptible
+from tests.interruptible import begun
 
 SMALL = RenderSettings((64, 64))
 ARGUMENTS = ["--images", "14", "--size", "96x80", "--seed", "3"]
 MANY = ["--images", "60", "--shard", "1"]
+WHOLE = [*ARGUMENTS, *MANY, "--workers", "2"]
 
 
 def run(out, *more):
@@ -55,20 +53,6 @@ def whole(tmp_path_factory):
     out = tmp_path_factory.mktemp("whole") / "dataset"
     assert run(out, *MANY) == 0
     return out
-
-
-def begun(out):
-    """Start the run of `whole` with two workers and return it once it has made two shards."""
-    command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS, *MANY]
-    process = interruptible(
-        [*command, "--workers", "2"], stderr=subprocess.PIPE, start_new_session=True
-    )
-    deadline = time.monotonic() + 300
-    while len(list(out.glob("shards/*.json"))) < 2:
-        assert process.poll() is None  # a finished run cannot be stopped
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    return process
 
 
 def records(out):
@@ -200,7 +184,7 @@ def test_running_again_restores_what_is_missing(dataset, tmp_path, lost):
 
 def test_a_killed_run_is_finished_to_the_same_bytes(dataset, whole, tmp_path):
     out = tmp_path / "out"
-    process = begun(out)
+    process = begun(out, *WHOLE, shards=2)
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate(timeout=300)
     assert "digest" not in json.loads((out / "dataset.json").read_text())
@@ -356,7 +340,7 @@ def test_a_second_run_on_the_same_folder_is_refused(dataset, tmp_path, capsys):
 
 def test_ctrl_c_stops_cleanly_and_the_run_can_be_continued(whole, tmp_path):
     out = tmp_path / "out"
-    process = begun(out)
+    process = begun(out, *WHOLE, shards=2)
     os.killpg(process.pid, signal.SIGINT)
     error = process.communicate(timeout=300)[1]
     assert process.returncode == 130

@@ -14,6 +14,7 @@ import pytest
 
 from fastgen.cli.main import main
 from fastgen.dataset.workers import undisturbed
+from tests.interruptible import begun
 
 ARGUMENTS = ["--images", "8", "--size", "64x64", "--cameras", "A", "--workers", "2"]
 STOPPED = "fastgen: stopped"
@@ -33,26 +34,12 @@ COMMANDS = {  # with the arguments that each requires
 }
 
 
-def begun(out, images="900"):
-    """Start a run in its own session and return it once it has begun to write.
+def long_run(out, images="900", shards=0):
+    """Start a run, and return it once it has begun to write.
 
     Workers of runs with more images would first load everything, which takes a while.
     """
-    command = [
-        sys.executable,
-        "-m",
-        "fastgen",
-        "generate",
-        str(out),
-        *ARGUMENTS,
-        "--images",
-        images,
-    ]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
-    while not (out / "dataset.json").exists():
-        assert process.poll() is None
-        time.sleep(0.02)
-    return process
+    return begun(out, *ARGUMENTS, "--images", images, shards=shards)
 
 
 def wait_for(condition):
@@ -73,9 +60,7 @@ def gone(processes):
 @pytest.mark.parametrize("moment", ["workers start", "shards are made"])
 def test_sigterm_stops_a_run_as_ctrl_c_does(tmp_path, moment):
     out = tmp_path / "out"
-    process = begun(out)
-    if moment == "shards are made":
-        wait_for(lambda: list(out.glob("shards/*.json")))
+    process = long_run(out, shards=int(moment == "shards are made"))
     family = psutil.Process(process.pid).children(recursive=True)
     process.send_signal(signal.SIGTERM)  # only to the parent, as docker does
     error = process.communicate(timeout=300)[1]
@@ -107,8 +92,7 @@ def test_a_stop_waits_until_a_process_has_started():
 
 def test_workers_whose_parent_was_killed_end_silently(tmp_path):
     out = tmp_path / "out"
-    process = begun(out)
-    wait_for(lambda: list(out.glob("shards/*.json")))
+    process = long_run(out, shards=1)
     family = psutil.Process(process.pid).children(recursive=True)
     assert len(family) >= 2
     process.kill()
@@ -119,8 +103,7 @@ def test_workers_whose_parent_was_killed_end_silently(tmp_path):
 
 def test_a_worker_ends_with_its_parent_although_one_forked_later_hangs(tmp_path):
     out = tmp_path / "out"
-    process = begun(out)
-    wait_for(lambda: list(out.glob("shards/*.json")))
+    process = long_run(out, shards=1)
     first, last = sorted(psutil.Process(process.pid).children(recursive=True), key=lambda p: p.pid)
     last.suspend()
     try:
@@ -134,7 +117,7 @@ def test_a_worker_ends_with_its_parent_although_one_forked_later_hangs(tmp_path)
 
 def test_a_run_stopped_by_sigterm_can_be_resumed(tmp_path):
     out = tmp_path / "out"
-    process = begun(out, "16")
+    process = long_run(out, "16")
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=300)
     before = signal.getsignal(signal.SIGTERM)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fastgen import Config, Generator
+from fastgen import Config
 from fastgen.camera.projection import view_of
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.directional_lights import DirectionalLight
@@ -117,10 +117,9 @@ def test_bits_tell_the_bodies_of_each_tile():
 
 
 @pytest.fixture(scope="module")
-def generator():
+def generator(generators):
     config = Config.from_values({"container": {"kinds": {"20": 1}}})
-    with Generator(config, seed=3, size=SIZE, quality="draft") as made:
-        yield made
+    return generators(config, seed=3, size=SIZE, quality="draft")
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from fastgen.scene.object_ids import scene_numbers
 from fastgen.scene.optics import Weather
 
 SIZE, FINE = (192, 144), (960, 720)
+CONFIG = Config.from_values({"container": {"kinds": {"20": 1}}})
 TOWARD = {
     "front": (0.0, -15000.0, 1300.0),
     "back": (0.0, 27000.0, 1300.0),
@@ -29,10 +30,8 @@ TOWARD = {
 
 
 @pytest.fixture(scope="module")
-def generator():
-    config = Config.from_values({"container": {"kinds": {"20": 1}}})
-    with Generator(config, seed=3, size=SIZE, quality="draft") as made:
-        yield made
+def generator(generators):
+    return generators(CONFIG, seed=3, size=SIZE, quality="draft")
 
 
 @pytest.fixture(scope="module")
@@ -83,10 +82,8 @@ def every_member(
 
 
 @pytest.fixture(scope="module", params=["draft", "balanced", "high"])
-def each_quality(request):
-    config = Config.from_values({"container": {"kinds": {"20": 1}}})
-    with Generator(config, seed=3, size=SIZE, quality=request.param) as made:
-        yield made
+def each_quality(generators, request):
+    return generators(CONFIG, seed=3, size=SIZE, quality=request.param)
 
 
 @pytest.mark.parametrize("name", VIEWS)
