@@ -149,15 +149,23 @@ class ContainerDataset(Dataset[Item]):
         self._taken[0] = 0
         self._epoch_chosen = True
 
-    def begin_pass(self) -> None:
+    def begin_pass(self, resume_at: tuple[int, int] = (0, 0)) -> int:
         """Go to the next epoch, unless one was set since the last pass over the data.
 
         ShardSampler calls this when a pass begins, and Loader does so for a stream.
+
+        Args:
+            resume_at: Epoch, and the position at which its pass begins.
+
+        Returns:
+            Position at which the pass begins: 0 in another epoch than that of `resume_at`.
         """
         if not self._epoch_chosen:
             self.set_epoch(self.epoch + 1)
         self._epoch_chosen = False
         self._taken[0] = 0  # single items may have been taken since set_epoch
+        epoch, position = resume_at
+        return position if epoch == self.epoch else 0
 
     @property
     def collate(self) -> Collate:
@@ -316,6 +324,11 @@ class ContainerStream(IterableDataset[Item]):
         """Go to an epoch, 0 to plan.MAX_EPOCH. Call it between two passes over the data."""
         self.dataset.set_epoch(epoch)
 
+    @property
+    def start(self) -> int:
+        """Position of the epoch where passes begin, counted over all ranks."""
+        return int(self._place[0])
+
     def start_at(self, position: int) -> None:
         """Let passes begin at a position of the epoch, counted over all ranks."""
         self._place.copy_(torch.tensor([whole("position", position), *self.part]))
@@ -331,7 +344,7 @@ class ContainerStream(IterableDataset[Item]):
         worker = get_worker_info()
         share = (worker.id, worker.num_workers) if worker else (0, 1)
         epoch = self.epoch  # read once: a pass stays in one epoch
-        places = positions(int(self._place[0]), self.length, self.part, share, self.batch_size)
+        places = positions(self.start, self.length, self.part, share, self.batch_size)
         for position in places:
             if self.length is not None:
                 self.dataset.count_item()

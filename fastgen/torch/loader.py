@@ -62,9 +62,7 @@ class ShardSampler(Sampler[int]):
 
     def __iter__(self) -> Iterator[int]:
         data = self._dataset
-        data.begin_pass()
-        epoch, position = self.resume_at
-        self.start = position if epoch == data.epoch else 0
+        self.start = data.begin_pass(self.resume_at)
         places = range(len(data))
         if self._shuffle:
             order = stream(data.seed, data.epoch, "order").permutation(len(data)).tolist()
@@ -167,9 +165,10 @@ class Loader:
 
     def state_dict(self) -> dict[str, Any]:
         """Return epoch, position after the last sample and description of the samples as JSON."""
+        epoch, position = self._reached
         return {
             "epoch": self.epoch,
-            "position": self._in_this_epoch(self._reached),
+            "position": position if epoch == self.epoch else 0,
             "made": {**self._items.description, "length": self._length, "shuffle": self._shuffle},
         }
 
@@ -206,27 +205,18 @@ class Loader:
 
     def __iter__(self) -> Iterator[Any]:
         resume_at, self._next_pass = self._next_pass, (0, 0)
-        start = 0
         if isinstance(self.sampler, ContainerStream):
-            self._items.begin_pass()
-            start = self._in_this_epoch(resume_at)
-            self.sampler.start_at(start)
+            self.sampler.start_at(self._items.begin_pass(resume_at))
         else:
             self.sampler.resume_at = resume_at
         _, world_size = self.sampler.part
         for number, batch in enumerate(self._loader, start=1):
-            if isinstance(self.sampler, ShardSampler):
-                start = self.sampler.start
+            start = self.sampler.start  # a ShardSampler begins its pass with the first batch
             position = start + number * self.batch_size * world_size
             if self._length is not None and number >= self._batches_in(start):
                 position = self._length
             self._reached = (self.epoch, position)
             yield batch
-
-    def _in_this_epoch(self, place: tuple[int, int]) -> int:
-        """Return the position of an epoch and position if the epoch is the current one, else 0."""
-        epoch, position = place
-        return position if epoch == self.epoch else 0
 
     def _batches_in(self, start: int) -> int:
         """Return the number of batches of this rank from a position to the end of the epoch."""
