@@ -132,9 +132,7 @@ def visible_share(values: NDArray[np.uint8]) -> NDArray[np.float32]:
     Args:
         values: uint8 [V, 3 or more], which begin with the cones of `encoded_cones`.
     """
-    _, length = _decoded(values[:, :3])
-    rim = np.clip(2 - 2 / 127 * length, 0, 1)
-    return np.asarray(1 - rim * rim, np.float32)
+    return _share(_decoded(values[:, :3])[1])
 
 
 def narrowed_cones(cones: NDArray[np.uint8], left: NDArray[np.floating]) -> NDArray[np.uint8]:
@@ -145,7 +143,7 @@ def narrowed_cones(cones: NDArray[np.uint8], left: NDArray[np.floating]) -> NDAr
         left: Share [V] of the cosine-weighted visible sky that is left, 0 to 1.
     """
     toward, length = _decoded(cones)
-    rim = np.sqrt(np.clip(1 - left * visible_share(cones), 0, 1))
+    rim = np.sqrt(np.clip(1 - left * _share(length), 0, 1))
     scale = 127 * (1 - rim / 2) / length
     return np.asarray(np.rint(128 + toward * scale).T, np.uint8)
 
@@ -352,6 +350,12 @@ def _directions(cone: NDArray[np.uint8]) -> NDArray[np.float32]:
     bent, length = _decoded(cone)
     normals: NDArray[np.float32] = (bent / length).T
     return normals
+
+
+def _share(length: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the visible share [K] of the hemispheres of cones with these lengths of 127 v."""
+    rim = np.clip(2 - 2 / 127 * length, 0, 1)
+    return np.asarray(1 - rim * rim, np.float32)
 
 
 def _decoded(cone: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

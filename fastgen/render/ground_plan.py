@@ -13,7 +13,7 @@ from fastgen.light.directional_lights import DirectionalLight
 from fastgen.render.ground_values import clear_radius_mm
 from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
-from fastgen.render.visible_members import solid_mm
+from fastgen.render.visible_members import hiding_tiles
 from fastgen.scene import Ground, Prop
 from fastgen.scene.boxes import OrientedBox, prop_box
 from fastgen.scene.limits import MM
@@ -83,9 +83,7 @@ def ground_plan(
     seen, near = _plane_tiles(tiles, ground, clear_radius_mm(ground, members, props))
     shown = shaded = dark = _none(tiles)
     masks = None
-    eye_mm = view.position_m / MM
-    solids = [solid for each in members if (solid := solid_mm(each, eye_mm)) is not None]
-    hidden = _any(tiles.filled(np.reshape(solids, (-1, 8, 3))))
+    hidden = _any(hiding_tiles(members, view, tiles))
     if props:
         parts = [prop_box(prop) for prop in props]
         seen_props = tiles.touched(np.stack([part.corners_mm for part in parts]))

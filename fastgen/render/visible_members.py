@@ -9,7 +9,7 @@ from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import inward_mm
 from fastgen.geometry.prepared_scene import Member
 from fastgen.render.regions import Region, box_corners
-from fastgen.render.tiles import Tiles
+from fastgen.render.tiles import Mask, Tiles
 from fastgen.scene.boxes import OrientedBox, away_mm, back_to_front, rotation_of
 from fastgen.scene.damage_kinds import form_of
 from fastgen.scene.limits import MM, NEAR_M
@@ -48,10 +48,7 @@ def visible_members(
     found: list[tuple[Member, Region]] = []
     # all containers at once, because NumPy is slow for few points
     touched = tiles.touched(np.reshape([_bounds_mm(each) for each in members], (-1, 8, 3)))
-    solids = [solid_mm(each, eye_mm) for each in members]
-    filled = tiles.filled(
-        np.reshape([np.zeros((8, 3)) if each is None else each for each in solids], (-1, 8, 3))
-    )
+    filled = hiding_tiles(members, view, tiles)
     for number in reversed(back_to_front([each.box for each in members], eye_mm)):
         member = members[number]
         shown = touched[number] & ~hidden
@@ -59,12 +56,21 @@ def visible_members(
             shown[:] = True
         if shown.any():
             found.append((member, tiles.around(shown)))
-            if solids[number] is not None:
-                hidden |= filled[number]
+            hidden |= filled[number]
     return found[::-1]
 
 
-def solid_mm(member: Member, eye_mm: Array) -> Array | None:
+def hiding_tiles(members: Sequence[Member], view: View, tiles: Tiles) -> Mask:
+    """Return the tiles [N, R, C] in which nothing behind each of N containers is seen."""
+    eye_mm = view.position_m / MM
+    solids = [_solid_mm(each, eye_mm) for each in members]
+    solid = [number for number, corners in enumerate(solids) if corners is not None]
+    found = np.zeros((len(members), *tiles.shape), bool)
+    found[solid] = tiles.filled(np.reshape([solids[number] for number in solid], (-1, 8, 3)))
+    return found
+
+
+def _solid_mm(member: Member, eye_mm: Array) -> Array | None:
     """Return corners [8, 3] of a box through which nothing behind a container is seen.
 
     None for a container with holes, with too deep dents, or beside the camera.
