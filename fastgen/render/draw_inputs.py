@@ -95,7 +95,7 @@ class Regions:
         return bands([*self.surfaces, *self.near_damage])
 
     def within(self, part: Region) -> "Regions":
-        """Return the intersections of these regions with a part of the image."""
+        """Return the parts of these regions inside one region of the image."""
         every = self.surfaces, self.near_damage, self.holes, self.cables
         return Regions(*(within(each, part) for each in every))
 
