@@ -18,7 +18,7 @@ SMALL_PX = 16
 """A container with fewer visible pixels has no label of its own. Pixels of such containers that
 touch one another form a group, which is one ignored object."""
 
-_STEP_RAD = 0.03
+_STEP_RAD = 0.02
 _STEPS_PX = 2, 16
 _BEND = 0.5
 """Rays are computed at nodes about _STEP_RAD apart and interpolated between them. Where the second
