@@ -9,6 +9,8 @@ import pytest
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.classes import DAMAGE_VALUES
+from fastgen.render import shadows
+from fastgen.render.depth_map import DepthMap
 from fastgen.scene import Camera, EnvironmentView, Neighbour, Pose, Spreader
 from fastgen.scene.boxes import back_to_front, container_box, overlap
 from tests import oracle, oracle_scene
@@ -167,6 +169,30 @@ def test_labels_do_not_depend_on_the_quality_and_edges_between_containers_are_op
     assert (drawn.ids != expected(scene, CAMERAS[1]).ids).mean() < 4e-4
     seen = np.isfinite(drawn.depth)
     assert (drawn.cover[seen & ~oracle.near_edge(seen)] == 255).mean() > 0.995
+
+
+def test_containers_that_share_a_shadow_map_look_as_with_a_map_each(
+    generators, scene, monkeypatch
+):
+    lit = replace(scene, environment=EnvironmentView("port_noon", 0.0))
+    generator = generators(CONFIG, seed=6, size=SIZE, quality="draft")
+    wanted = [generator.render(scene=lit, camera=each).image for each in CAMERAS[:2]]
+    drawn, draw = [], DepthMap.draw
+
+    def counted(depth_map, views):
+        drawn.append(depth_map)
+        draw(depth_map, views)
+
+    monkeypatch.setattr(DepthMap, "draw", counted)
+    monkeypatch.setattr(shadows, "_MAPS", 2)
+    counts = []
+    with Generator(CONFIG, seed=6, size=SIZE, quality="draft") as sharing:
+        for camera, image in zip(CAMERAS[:2], wanted, strict=True):
+            drawn.clear()
+            np.testing.assert_array_equal(sharing.render(scene=lit, camera=camera).image, image)
+            counts.append((len(drawn), len(set(drawn))))
+    # the second image keeps the map of the first container
+    assert counts == [(4, 2), (3, 1)]
 
 
 def test_order_of_boxes_agrees_with_rays():
