@@ -100,7 +100,7 @@ __all__ = [
     "grid",
     "to_trimesh",
 ]
-__version__ = "0.43.0"
+__version__ = "0.44.0"
 
 _HOMES = {
     "Config": "config.config",

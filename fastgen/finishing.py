@@ -36,7 +36,7 @@ def with_camera_model(frame: Frame, image: ImageRequest, renderer: Renderer) -> 
         return frame
     scene, camera, view = image.prepared.scene, image.camera, image.view
     exposure = renderer.exposure(scene, camera, view.size)
-    light = renderer.ambient(scene.environment)
+    light = renderer.ambient(scene)
     air = airlight(light, scene.environment.yaw_deg, exposure.factor)
     developed = apply_camera_model(frame, view, camera, scene.weather, air, exposure, scene.ground)
     return replace(frame, image=developed)

@@ -80,7 +80,6 @@ def test_wet_ground_reflects_the_share_of_a_light_that_water_does(gl, slope_deg,
 def test_glare_lies_where_the_sun_is_mirrored_and_ends_in_shadows():
     with Generator(Config.preset("gate"), seed=3, size=SIZE, quality="draft") as made:
         first = made.scene(0)
-        sun = made.gpu.renderer().ambient(EnvironmentView("port_afternoon", 0.0)).lights[0]
         scene = replace(
             bare(first),
             damages=(),
@@ -89,7 +88,7 @@ def test_glare_lies_where_the_sun_is_mirrored_and_ends_in_shadows():
             environment=EnvironmentView("port_afternoon", 0.0),
             ground=Ground("concrete", 0.0, wear=0.0, lines=0.0, reach_mm=30000.0, wetness=0.6),
         )
-        toward = np.array(sun.direction)
+        toward = np.array(made.gpu.renderer().ambient(scene).lights[0].direction)
         eye = 6000 * np.array([-toward[0], -toward[1], toward[2]]) / np.linalg.norm(toward)
         camera = Camera("glare", tuple(map(float, eye)), (0.0, 0.0, 0.0), 24.0)
         shade = Prop(

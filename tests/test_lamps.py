@@ -40,7 +40,7 @@ def test_a_surface_that_faces_a_lamp_gets_its_illuminance(night, yaw_deg):
     assert lux(few, [0, 0, 1], yaw_deg, cd_m2) == pytest.approx(30)
     toward = np.array([np.cos(np.deg2rad(40)), np.sin(np.deg2rad(40)), np.tan(np.deg2rad(25))])
     toward /= np.linalg.norm(toward)
-    lit = with_lamps(few, view)
+    lit = with_lamps(few, view, cd_m2)
     for normal, share in ((toward, 1.0), ([0, 0, 1], np.sin(np.deg2rad(25))), (-toward, 0.0)):
         added = lux(lit, normal, yaw_deg, cd_m2) - lux(few, normal, yaw_deg, cd_m2)
         assert added == pytest.approx(120 * share, abs=0.01)
@@ -51,10 +51,11 @@ def test_a_surface_that_faces_a_lamp_gets_its_illuminance(night, yaw_deg):
 def test_the_weakest_lights_give_way_to_lamps(night):
     assert len(night.lights) == MAX_LIGHTS
     lamps = (Lamp(0.0, 30.0, 500.0), Lamp(90.0, 30.0, 400.0))
-    lit = with_lamps(night, EnvironmentView("port_night", 0.0, 30.0, lamps))
+    cd_m2 = unit_luminance(night, 30.0)
+    lit = with_lamps(night, EnvironmentView("port_night", 0.0, 30.0, lamps), cd_m2)
     assert len(lit.lights) == MAX_LIGHTS
     assert lit.lights[2:] == night.lights[:2]
-    assert with_lamps(night, EnvironmentView("port_night", 0.0, 30.0)) is night
+    assert with_lamps(night, EnvironmentView("port_night", 0.0, 30.0), cd_m2) is night
 
 
 def test_the_configured_share_of_dark_scenes_has_lamps_and_nothing_else_changes():

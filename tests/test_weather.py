@@ -12,12 +12,13 @@ from fastgen.camera.weather import _streaks, add_fog, add_rain
 from fastgen.config.config import Config
 from fastgen.generator import Generator
 from fastgen.light.exposure import airlight
-from fastgen.scene import Camera, Ground, Spreader
+from fastgen.scene import Camera, EnvironmentView, Ground, Spreader
 from fastgen.scene.optics import Lens, Rain, Weather
 from tests.test_environment import write_exr
 from tests.tone_inverse import light_of
 
 SIZE = (160, 120)
+EVEN_SKY = EnvironmentView("port_overcast", 0.0)
 
 
 def test_fog_leaves_a_fiftieth_of_a_contrast_at_its_visibility():
@@ -165,11 +166,11 @@ def test_water_darkens_porous_surfaces(generators):
 def test_fog_depends_on_the_distance_along_each_ray(generators, lens):
     camera = Camera("T", (0, -6000, 1200), (0, 0, 1200), 24.0, lens=lens)
     generator = generators(seed=6, size=SIZE)
-    scene = replace(generator.scene(2), weather=Weather(visibility_mm=40e3))
+    scene = replace(generator.scene(2), weather=Weather(visibility_mm=40e3), environment=EVEN_SKY)
     sample = generator.render(scene=scene, camera=camera)
     clear = generator.render(scene=replace(scene, weather=Weather()), camera=camera)
     with generator.gpu.drawing() as renderer:
-        light, yaw_deg = renderer.ambient(scene.environment), scene.environment.yaw_deg
+        light, yaw_deg = renderer.ambient(scene), scene.environment.yaw_deg
         air = np.array(airlight(light, yaw_deg, generator.exposure(scene, camera)))
     _, rays = sample.view.rays()
     forward = sample.view.rotation[2]
@@ -187,11 +188,17 @@ def test_fog_continues_over_the_ground_of_the_surroundings(generators):
     camera = Camera("T", (0, -6000, 2500), (0, -12000, 2200), 20.0)
     generator = generators(seed=6, size=SIZE)
     ground = Ground("asphalt", 0.0, (0.1, 0.1, 0.1), reach_mm=15000.0)
-    dry = replace(generator.scene(2), ground=ground, spreader=Spreader(), weather=Weather())
+    dry = replace(
+        generator.scene(2),
+        ground=ground,
+        spreader=Spreader(),
+        weather=Weather(),
+        environment=EVEN_SKY,
+    )
     foggy = replace(dry, weather=Weather(visibility_mm=150e3))
     clear, sample = (generator.render(scene=scene, camera=camera) for scene in (dry, foggy))
     with generator.gpu.drawing() as renderer:
-        light, yaw_deg = renderer.ambient(dry.environment), dry.environment.yaw_deg
+        light, yaw_deg = renderer.ambient(dry), dry.environment.yaw_deg
         air = np.array(airlight(light, yaw_deg, generator.exposure(dry, camera)))
     _, rays = sample.view.rays()
     away = np.where(rays[..., 2] < 0, 2.5 / np.maximum(-rays[..., 2], 1e-6), 300).clip(max=300)

@@ -8,7 +8,7 @@ from fastgen.camera.projection import View
 from fastgen.camera.tone_curve import Light
 from fastgen.scene.optics import Rain
 
-_CONTRAST = 3.912
+CONTRAST = 3.912
 """-ln 0.02: at the visibility distance 2 % of a contrast remains (Koschmieder 1924)."""
 
 BACKDROP_M = 300.0
@@ -50,7 +50,7 @@ def add_fog(
         airlight: float32 [3], A.
         backdrop_m: Distance of the surroundings along the ray in metres, one or float32 [H, W].
     """
-    decay = np.float32(-_CONTRAST * 1e3 / visibility_mm)
+    decay = np.float32(-CONTRAST * 1e3 / visibility_mm)
     far = np.broadcast_to(np.exp(decay * np.float32(backdrop_m)), ray_m.shape)
     near = np.exp(decay * _objects_m(ray_m))
     left = np.where(cover == 0, far, near)

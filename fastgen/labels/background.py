@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
+from fastgen.camera.weather import BACKDROP_M
 from fastgen.classes import BACKGROUND_ID
 from fastgen.labels.visibility import Shot, mask_box, value_boxes, visibility, window
 from fastgen.light.container_map import POINTS, ContainerMap
@@ -56,6 +57,7 @@ def background_objects(
     boxes, areas = value_boxes(part, 1, int(part.max()) + 1)
     whole = np.bincount(inside[inside > 0], minlength=len(boxes) + 1)
     beyond = _beyond(shot, containers, shown, areas, whole)
+    in_fog = 0 < shot.scene.weather.visibility_mm < BACKDROP_M / MM
     objects = []
     for number, found in enumerate(boxes, start=1):
         if found is None:
@@ -64,7 +66,7 @@ def background_objects(
         group = number > containers.count
         hidden = 0 if group else int(whole[number]) - area
         facts = visibility(shot.config, shot.view.size, area, hidden, beyond.get(number, 0))
-        facts["ignored"] |= group or shot.config.labels.background == "ignore"
+        facts["ignored"] |= group or in_fog or shot.config.labels.background == "ignore"
         objects.append(
             Object(
                 id=BACKGROUND_ID + number,

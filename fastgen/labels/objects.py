@@ -59,7 +59,7 @@ def label(shot: Shot) -> list[Object]:
     if not shot.scene.container.present:
         return []
     if not shot.scene.neighbours:
-        return _label(shot)
+        return _in_fog(shot, _label(shot))
     found: list[Object] = []
     for member in shot.prepared.members:
         before = Counter(item.class_name for item in found)
@@ -73,7 +73,29 @@ def label(shot: Shot) -> list[Object]:
             )
             for item in _label(shot.of_member(member))
         ]
-    return found
+    return _in_fog(shot, found)
+
+
+def _in_fog(shot: Shot, objects: list[Object]) -> list[Object]:
+    """Return the objects, with those ignored that lie beyond the visibility in fog."""
+    visibility_mm = shot.scene.weather.visibility_mm
+    if not visibility_mm:
+        return objects
+    frame = shot.frame
+    near = frame.depth <= MM * visibility_mm
+    ids, damages = (set(np.unique(each[near]).tolist()) for each in (frame.ids, frame.damage))
+
+    def in_sight(item: Object) -> bool:
+        if item.class_name in ALL_DAMAGE_CLASSES:
+            return item.id in damages
+        if item.class_name != "container":
+            return item.id in ids
+        numbers = shot.prepared.members[item.container].prepared.numbers
+        return not damages.isdisjoint((numbers.undamaged, *numbers.damages))
+
+    return [
+        item if item.ignored or in_sight(item) else replace(item, ignored=True) for item in objects
+    ]
 
 
 def _label(shot: Shot) -> list[Object]:

@@ -25,18 +25,18 @@ def unit_luminance(light: Ambient, illuminance_lx: float) -> float:
     return illuminance_lx / (np.pi * max(up, _LEAST_LUMINANCE))
 
 
-def with_lamps(light: Ambient, environment: EnvironmentView) -> Ambient:
+def with_lamps(light: Ambient, environment: EnvironmentView, cd_m2: float) -> Ambient:
     """Return the light of an environment and of its lamps; `light` itself if it has no lamps.
 
     The weakest directional lights give way, because MAX_LIGHTS is the most that cast shadows.
 
     Args:
         light: The environment without lamps.
-        environment: Its lamps, rotation and illuminance.
+        environment: Its lamps and rotation.
+        cd_m2: Luminance of a unit of radiance.
     """
     if not environment.lamps:
         return light
-    cd_m2 = unit_luminance(light, environment.illuminance_lx)
     added = []
     for lamp in environment.lamps:
         azimuth, elevation = np.deg2rad((lamp.azimuth_deg, lamp.elevation_deg))

@@ -18,7 +18,7 @@ from fastgen.render.scene_bodies import LitMember, scene_bodies
 from fastgen.render.scene_lights import Around
 from fastgen.render.scene_resources import SceneResources
 from fastgen.render.shapes import Shapes
-from fastgen.scene import EnvironmentView
+from fastgen.scene import Scene
 
 _SCENES = 2
 """Number of scenes whose bodies are kept, for their other cameras."""
@@ -39,7 +39,7 @@ class RayLight:
         gl: GLContext,
         programs: Programs,
         resources: Callable[[PreparedScene], SceneResources],
-        ambient: Callable[[EnvironmentView], Ambient],
+        ambient: Callable[[Scene], Ambient],
     ) -> None:
         self._gl = gl
         self._programs = programs
@@ -74,14 +74,12 @@ class RayLight:
 
         def lit(each: Member) -> LitMember:
             prepared, materials = each.prepared, self._resources(each.prepared).materials
-            light = shapes.light(
-                prepared, materials, lens, self._ambient(prepared.scene.environment)
-            )
+            light = shapes.light(prepared, materials, lens, self._ambient(prepared.scene))
             paints = np.array(materials.reflectances, np.float32)
             return LitMember(each, paints, light, None if around is None else around[prepared])
 
         def found() -> RayBodies:
-            ambient = self._ambient(scene.environment)
+            ambient = self._ambient(scene)
             return scene_bodies(map(lit, whole.present), scene, lens, ambient, ground)
 
         rays = self._passes.get(size, lambda: RayPass(self._gl, self._programs, size))

@@ -48,7 +48,7 @@ from fastgen.render.tiles import Tiles
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.visible_members import visible_members
 from fastgen.render.zone_codes import SPREADER_ZONE
-from fastgen.scene import Camera, EnvironmentView, Scene
+from fastgen.scene import Camera, Scene
 from fastgen.scene.damage_kinds import program_kinds
 from fastgen.scene.limits import MM
 
@@ -251,8 +251,7 @@ class Renderer:
         damage = variant(damages)
         per_axis, of_cables = self._targets.samples_per_axis(prepared, view)
         samples = self._targets.samples(size, per_axis)
-        environment = scene.environment
-        light, ambient = self._lights.of(environment.name), self.ambient(environment)
+        light, ambient = self._lights.of(scene), self.ambient(scene)
         resources = self._materials.resources(prepared)
         near = None if around is None else around.get(prepared)
         container, spreader, below = self._shapes.of(
@@ -308,7 +307,7 @@ class Renderer:
             exposure: Factor on radiance.
         """
         scene, view = member.prepared.scene, inputs.view
-        lights = self.ambient(scene.environment).lights
+        lights = self.ambient(scene).lights
         shadow = self._lights.shadows.cast(member, whole, lights)
         if shadow is not None:
             inputs.textures["shadow_map"] = shadow.depth
@@ -319,7 +318,7 @@ class Renderer:
         self, inputs: DrawInputs, member: Member, whole: PreparedScene, around: Around | None
     ) -> None:
         """Light the visible surfaces by rays, if the quality asks for it."""
-        sky = self._lights.of(whole.scene.environment.name).sky_rays
+        sky = self._lights.of(whole.scene).sky_rays
         if not inputs.variant.traced or sky is None or not inputs.regions.surfaces:
             return
         self._rays.run(inputs, member, whole, self._shapes, around, self._ground.light(whole), sky)
@@ -354,7 +353,7 @@ class Renderer:
         members = [(each.prepared, view.in_frame(each.pose)) for each in prepared.present]
         per_axis = frozenset(self._targets.samples_per_axis(*each) for each in members)
         damages = seen_damages(prepared.scene.damages, camera.position_mm)
-        lights = shader_lights(self.ambient(prepared.scene.environment).lights)
+        lights = shader_lights(self.ambient(prepared.scene).lights)
         spreader = prepared.scene.spreader.present
         return variant(damages), lights, camera.lens is not None, spreader, per_axis
 
@@ -363,9 +362,9 @@ class Renderer:
         """Shadows of the directional lights on the first container of the last scene."""
         return self._lights.shadows.of(0)
 
-    def ambient(self, environment: EnvironmentView) -> Ambient:
-        """Return the light of an environment and its lamps, as the CPU uses it."""
-        return self._lights.ambient(environment)
+    def ambient(self, scene: Scene) -> Ambient:
+        """Return the light of a scene's environment, below its fog, and of its lamps."""
+        return self._lights.ambient(scene)
 
     def bake(self, prepared: PreparedScene, texel_mm: float) -> Atlas:
         """Bake the material of a scene's container, damage included, see bake.Atlas."""

@@ -9,6 +9,7 @@ from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.exposure import metered_exposure
+from fastgen.light.fog import below_fog
 from fastgen.light.ground_light import mean_albedo
 from fastgen.light.lamps import unit_luminance, with_lamps
 from fastgen.light.surrounding_change import SurroundingLight
@@ -44,34 +45,49 @@ class SceneLights:
         self._light_of = light
         self._traced = quality.traced
         self._lights: ReleasingCache[GpuLight] = ReleasingCache(24)
+        self._foggy: ReleasingCache[GpuLight] = ReleasingCache(2)
         self._backgrounds = BackgroundTextures(gl)
         self._lit: RecentCache[Ambient] = RecentCache(4)
         self._around: RecentCache[Around] = RecentCache(2)
         self.shadows = Shadows(gl.ctx, quality.shadow_detail)
 
-    def of(self, environment: str) -> GpuLight:
-        """Return the light of an environment."""
+    def of(self, scene: Scene) -> GpuLight:
+        """Return the light of a scene's environment, below its fog, without its lamps."""
+        name, visibility_mm = scene.environment.name, scene.weather.visibility_mm
+        if not visibility_mm or not self._clear(name).ambient.lights:
+            return self._clear(name)
+
+        def below() -> GpuLight:
+            return GpuLight(self._gl, below_fog(self._light_of(name), visibility_mm), self._traced)
+
+        return self._foggy.get((name, visibility_mm), below)
+
+    def _clear(self, name: str) -> GpuLight:
+        """Return the light of an environment without fog."""
         return self._lights.get(
-            environment, lambda: GpuLight(self._gl, self._light_of(environment), self._traced)
+            name, lambda: GpuLight(self._gl, self._light_of(name), self._traced)
         )
 
-    def ambient(self, environment: EnvironmentView) -> Ambient:
-        """Return the light of an environment and its lamps, as the CPU uses it."""
-        light = self.of(environment.name).ambient
+    def ambient(self, scene: Scene) -> Ambient:
+        """Return the light of a scene's environment and lamps, as the CPU uses it."""
+        light, environment = self.of(scene).ambient, scene.environment
         if not environment.lamps:
             return light
-        return self._lit.get(environment, lambda: with_lamps(light, environment))
+        key = environment, scene.weather.visibility_mm
+        return self._lit.get(key, lambda: with_lamps(light, environment, self._cd_m2(environment)))
+
+    def _cd_m2(self, environment: EnvironmentView) -> float:
+        """Return the luminance in cd/m2 of a unit of radiance."""
+        return unit_luminance(self._clear(environment.name).ambient, environment.illuminance_lx)
 
     def background(self, environment: str) -> moderngl.Texture:
         """Return the background map of an environment."""
-        return self._backgrounds.get(self.of(environment))
+        return self._backgrounds.get(self._clear(environment))
 
     def exposure(self, scene: Scene, camera: Camera, view: View) -> Exposure:
         """Return the exposure of a camera; its factor applies to radiance before the tone curve."""
         environment, paint = scene.environment, scene.surface.paint.albedo
-        unlit = self.of(environment.name).ambient
-        cd_m2 = unit_luminance(unlit, environment.illuminance_lx)
-        light = self.ambient(environment)
+        light, cd_m2 = self.ambient(scene), self._cd_m2(environment)
         ground = mean_albedo(scene.ground) if scene.ground else None
         return metered_exposure(light, cd_m2, environment.yaw_deg, view, camera, paint, ground)
 
@@ -91,7 +107,7 @@ class SceneLights:
                 [each.box for each in members],
                 [resources(each.prepared).materials.sheet for each in members],
                 [each.prepared.container.bounds_mm for each in members],
-                self.ambient(scene.environment),
+                self.ambient(scene),
                 scene.environment.yaw_deg,
                 Paving(ground.height_mm, mean_albedo(ground)) if ground else None,
             )
@@ -101,5 +117,5 @@ class SceneLights:
 
     def release(self) -> None:
         """Free all GL objects."""
-        for item in (self._lights, self._backgrounds, self.shadows):
+        for item in (self._lights, self._foggy, self._backgrounds, self.shadows):
             item.release()

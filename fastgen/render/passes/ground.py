@@ -25,7 +25,7 @@ from fastgen.render.scene_lights import Around
 from fastgen.render.textures import data_texture
 from fastgen.render.tiles import Mask
 from fastgen.render.variant import GroundVariant, ShaderVariant
-from fastgen.scene import EnvironmentView, Scene
+from fastgen.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ class GroundPass:
         self,
         ctx: moderngl.Context,
         programs: Programs,
-        ambient: Callable[[EnvironmentView], Ambient],
+        ambient: Callable[[Scene], Ambient],
         around: Callable[[PreparedScene], Around],
     ) -> None:
         """Prepare the pass.
@@ -51,7 +51,7 @@ class GroundPass:
         Args:
             ctx: Current context.
             programs: Programs of the renderer.
-            ambient: Returns the light of an environment, such as `Renderer.ambient`.
+            ambient: Returns the light of a scene, such as `Renderer.ambient`.
             around: Returns what surroundings change in the light on each container of a scene.
         """
         self._ctx = ctx
@@ -72,7 +72,7 @@ class GroundPass:
         scene = prepared.scene
         if scene.ground is None:
             return None
-        lights = _world_lights(scene, self._ambient(scene.environment))
+        lights = _world_lights(scene, self._ambient(scene))
         return ground_plan(scene.ground, scene.props, prepared.present, view, lights)
 
     def run(self, inputs: DrawInputs, prepared: PreparedScene, plan: GroundPlan) -> None:
@@ -114,7 +114,7 @@ class GroundPass:
         scene, kept = prepared.scene, self._light_of(prepared)
         assert scene.ground is not None
         if kept.block is None:
-            lights = _world_lights(scene, self._ambient(scene.environment))
+            lights = _world_lights(scene, self._ambient(scene))
             toward = np.array(lights[0].direction if lights else (0.0, 0.0, 1.0))
             values = ground_values(scene.ground, prepared.present, scene.props, kept.light, toward)
             kept.block = GROUND_BLOCK.pack(values)
@@ -135,7 +135,7 @@ class GroundPass:
                 ground_light(
                     [member.box for member in present],
                     [around[member.prepared].faces[:4] for member in present],
-                    self._ambient(scene.environment),
+                    self._ambient(scene),
                     scene.environment.yaw_deg,
                     ground.height_mm,
                 ),
@@ -157,7 +157,7 @@ class GroundPass:
         ground = scene.ground
         if ground is None:
             return None
-        ambient = self._ambient(scene.environment)
+        ambient = self._ambient(scene)
         unlit = ground_light([], [], ambient, 0.0, ground.height_mm)
         values = ground_values(ground, [], [], unlit, np.array([0.0, 0.0, 1.0]))
         self._block.write(GROUND_BLOCK.pack(values))

@@ -1,0 +1,122 @@
+"""Light of an environment below a layer of fog: dimmer directional lights, and a brighter sky."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.camera.weather import CONTRAST
+from fastgen.light import octahedral, prefilter
+from fastgen.light.environment import (
+    IRRADIANCE_SIZE,
+    ROUGHNESS_LEVELS,
+    SPECULAR_SIZE,
+    EnvironmentLight,
+)
+from fastgen.light.hdri import HALF_MAX
+
+_LAYER_M = 60.0
+"""Assumed height of the fog. Fog at a quay is some tens of metres high; haze of more visibility is
+higher, but hardly dims the sun."""
+
+_FORWARD = 0.85
+"""Mean cosine of the scattering angle in clouds and fog (Bohren 1987, "Multiple Scattering of Light
+and Some of Its Observable Consequences", American Journal of Physics 55)."""
+
+_LEAST_SHARE = 0.01
+"""Directional lights that keep a smaller share of their light are left out."""
+
+_GRID_ROWS = 128
+
+
+def below_fog(light: EnvironmentLight, visibility_mm: float) -> EnvironmentLight:
+    """Return the light of an environment below a level layer of fog.
+
+    Fog scatters a part of the light of the directional lights, and most of that reaches the ground
+    from all directions of the sky. The sky itself is taken to be as bright as without fog.
+
+    Args:
+        light: The environment.
+        visibility_mm: Meteorological visibility.
+
+    Returns:
+        `light` itself if it has no directional lights above the horizon.
+    """
+    depth = CONTRAST * _LAYER_M * 1e3 / visibility_mm
+    added = np.zeros(3)
+    lights = []
+    for each in light.lights:
+        rise = each.direction[2]
+        if rise <= 0:
+            lights.append(each)
+            continue
+        direct, total = transmitted(depth, rise)
+        added += rise * (total - direct) * np.array(each.light)
+        if direct > _LEAST_SHARE:
+            r, g, b = (direct * np.array(each.light)).tolist()
+            lights.append(replace(each, light=(r, g, b)))
+    if not added.any():
+        return light
+    scattered = added.astype(np.float32)
+    toward, _ = octahedral.octahedral_texels(light.sky.shape[0])
+    above = (1 + np.sign(toward[:, 2].round(6))) / 2  # half of a cell on the horizon is above it
+    shown = above.astype(np.float32).reshape(*light.sky.shape[:2], 1)
+    return replace(
+        light,
+        lights=tuple(lights),
+        sky=light.sky + shown * scattered,
+        irradiance=_plus(light.irradiance, _half_sky_irradiance() * scattered),
+        specular=_plus(light.specular, _half_sky_mirrored() * scattered),
+    )
+
+
+def transmitted(optical_depth: float, cosine: float) -> tuple[float, float]:
+    """Return the shares of sunlight that reach the ground through a layer that absorbs nothing.
+
+    Eddington's approximation over a black ground (Shettle and Weinman 1970, "The Transfer of Solar
+    Irradiance through Inhomogeneous Turbid Atmospheres Evaluated by Eddington's Approximation",
+    Journal of the Atmospheric Sciences 27).
+
+    Args:
+        optical_depth: Vertical optical depth of the layer.
+        cosine: Cosine of the angle between the sun and the vertical, above 0.
+
+    Returns:
+        The direct share (Beer-Lambert) and the whole share, scattered light included.
+    """
+    direct = float(np.exp(-optical_depth / cosine))
+    total = (2 / 3 + cosine + (2 / 3 - cosine) * direct) / (4 / 3 + (1 - _FORWARD) * optical_depth)
+    return direct, min(max(total, direct), 1.0)
+
+
+def _plus(radiance: NDArray[np.float32], added: NDArray[np.float32]) -> NDArray[np.float32]:
+    half = np.minimum(radiance + added, HALF_MAX).astype(np.float16)
+    return np.asarray(half, np.float32)
+
+
+@cache
+def _half_sky() -> NDArray[np.float32]:
+    """Return equirectangular radiance [H, 2H, 3]: 1 above the horizon, 0 below."""
+    sky = np.zeros((_GRID_ROWS, 2 * _GRID_ROWS, 3), np.float32)
+    sky[: _GRID_ROWS // 2] = 1
+    return sky
+
+
+@cache
+def _half_sky_irradiance() -> NDArray[np.float32]:
+    """Return irradiance / pi under `_half_sky`, [M, M, 3], as EnvironmentLight.irradiance."""
+    diffuse = prefilter.convolve(_half_sky(), prefilter.cosine_lobe)
+    return octahedral.resample_octahedral(diffuse, IRRADIANCE_SIZE, 1)
+
+
+@cache
+def _half_sky_mirrored() -> NDArray[np.float32]:
+    """Return `_half_sky` convolved as EnvironmentLight.specular, [L, N, N, 3]."""
+    layers = [
+        octahedral.resample_octahedral(
+            prefilter.convolve(_half_sky(), prefilter.ggx_lobe(roughness)), SPECULAR_SIZE, 4
+        )
+        for roughness in ROUGHNESS_LEVELS
+    ]
+    return np.stack(layers)
