@@ -67,28 +67,17 @@ def label_sentence() -> str:
     )
 
 
-def version_sentence() -> str:
-    """Return a sentence on the CPU time of this version, for rates of an older one."""
-    found = stored("versions")
-    draft, balanced = (found["qualities"][q]["ratio"] for q in ("draft", "balanced"))
-    return (
-        f"Version {found['fastgen']} takes {draft:.2f} times (`draft`) and {balanced:.2f} times "
-        f"(`balanced`) the CPU time of {found['other']} (`python bench/versions.py DIR`)."
-    )
-
-
 def readme_lines() -> list[str]:
     """Return the section of README.md."""
     rates = {q: usual_row(q)["steady_images_per_s"]["2"] for q in ("draft", "balanced")}
-    peers = stored("peers")["peers"].items()
+    about, peers = stored("throughput"), stored("peers")["peers"].items()
     traced = [row["cores"] / 1e3 for name, row in peers if name.startswith("Cycles")]
     equal, ratio = equal_cycles("balanced")
     return _wrapped(
         f"""- **Speed.** {rates["draft"]:.0f} labelled 640x640 images per second with `draft` and
-        {rates["balanced"]:.0f} with `balanced` on two CPU cores (version
-        {stored("throughput")["fastgen"]}). Blender Cycles takes {min(traced):.0f} to
-        {max(traced):.0f} s of CPU time per image ([benchmarks](docs/benchmarks.md#results)).
-        {version_sentence()}""",
+        {rates["balanced"]:.0f} with `balanced` on two CPU cores ({about["machine"]}, version
+        {about["fastgen"]}). Blender Cycles takes {min(traced):.0f} to {max(traced):.0f} s of CPU
+        time per image ([benchmarks](docs/benchmarks.md#results)).""",
         f"""- **Accuracy.** `balanced` is as close to a path-traced reference as Cycles with
         {equal.words} samples per pixel ([accuracy](docs/accuracy.md), version
         {stored("pareto")["fastgen"]}), at 1/{ratio:.0f} of its CPU time on a busy machine

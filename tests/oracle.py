@@ -23,6 +23,13 @@ SPREADER = 60000
 SEAL = 60001
 """Id of a seal at the first hasp."""
 
+CATEGORIES = {
+    **{"axis": 2, "concave": 3, "dented": 4, "perforation": 5, "scrape": 6},
+    **{"rust_through": 7, "missing_paint": 8, "graffiti": 9, "door_gear": 10},
+    "buckle": 11,  # of the package in docs/extend.md
+}
+"""COCO category of each kind of damage; values of the damage target are category * 100 + instance."""
+
 
 @dataclass
 class Hits:
@@ -227,13 +234,10 @@ def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
 
 def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
     """Return the damage target expected from the rays, uint16 [H, W]."""
-    order = {"axis": 2, "concave": 3, "dented": 4, "perforation": 5, "scrape": 6}
-    order |= {"rust_through": 7, "missing_paint": 8, "graffiti": 9, "door_gear": 10}
-    order |= {"buckle": 11}  # of the package in docs/extend.md
-    values, counts = [], dict.fromkeys(order, 0)
+    values, counts = [], dict.fromkeys(CATEGORIES, 0)
     for damage in scene.damages:
         counts[damage.kind] += 1
-        values.append(order[damage.kind] * 100 + counts[damage.kind])
+        values.append(CATEGORIES[damage.kind] * 100 + counts[damage.kind])
     target = np.where(hits.hit, 101, 0).astype(np.uint16)
     most = np.full(target.shape, threshold_mm)
     for damage, value in zip(scene.damages, values, strict=True):

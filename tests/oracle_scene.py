@@ -79,7 +79,7 @@ def truth(scene: Scene, view: View, threshold_mm: float, pixels: np.ndarray | No
         counts: dict[int, int] = {}
         values[101] = 101 + number
         for item in own.damages:
-            category = ("axis", "concave", "dented", "perforation").index(item.kind) + 2
+            category = oracle.CATEGORIES[item.kind]
             counts[category] = counts.get(category, 0) + 1
             before = instances.get(category, 0)
             values[100 * category + counts[category]] = 100 * category + before + counts[category]

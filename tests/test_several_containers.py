@@ -8,7 +8,7 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
-from fastgen.classes import DAMAGE_VALUES
+from fastgen.classes import BUNDLED_DAMAGE_CLASSES, DAMAGE_VALUES
 from fastgen.render import shadows
 from fastgen.render.depth_map import DepthMap
 from fastgen.scene import Camera, EnvironmentView, Neighbour, Pose, Spreader
@@ -29,6 +29,7 @@ POSES = (
     Pose((6300.0, 100.0, 0.0), 2.5),
     Pose((0.0, 0.0, 2616.0), 0.0),
 )
+ROW = tuple(Pose((0.0, 3000.0 * k, 0.0)) for k in (1, 2, 3))
 CAMERAS = (
     Camera("left", (-6000.0, -8000.0, 4500.0), (500.0, 0.0, 1500.0), 24.0),
     Camera("right", (9000.0, 9000.0, 6000.0), (500.0, 1000.0, 1500.0), 24.0),
@@ -85,6 +86,23 @@ def test_pixels_equal_the_nearest_hit_of_rays_at_each_container(generator, scene
     both = np.isfinite(found.depth_m) & (sample.ids > 0)
     assert both.mean() > 0.1
     assert np.quantile(np.abs(sample.depth[both] / found.depth_m[both] - 1), 0.995) < 1e-5
+
+
+def test_pixels_equal_the_nearest_hit_of_rays_for_every_kind_of_damage(generators):
+    damage = {"probability": 1, "count": [6, 8], "kinds": list(BUNDLED_DAMAGE_CLASSES)}
+    config = Config.from_values({"damage": damage, "seals": {"probability": 0}})
+    generator = generators(config, seed=6, size=SIZE, quality="draft")
+    first, *others = (generator.scene(i) for i in range(4))
+    several = replace(first, spreader=Spreader(), neighbours=neighbours_of(others, ROW))
+    kinds = {each.kind for part in (several, *several.neighbours) for each in part.damages}
+    assert kinds == set(BUNDLED_DAMAGE_CLASSES)
+    for camera in CAMERAS[:2]:
+        sample = generator.render(scene=several, camera=camera)
+        found = expected(several, camera)
+        for drawn, wanted in ((sample.ids, found.ids), (sample.damage, found.damage)):
+            wrong = drawn != wanted
+            assert wrong.mean() < 4e-4
+            assert (oracle.near_edge(found.damage) | oracle.near_edge(found.ids))[wrong].all()
 
 
 def test_an_undamaged_scene_differs_only_in_its_damages(generator, scene):
