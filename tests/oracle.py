@@ -28,7 +28,7 @@ CATEGORIES = {
     **{"rust_through": 7, "missing_paint": 8, "graffiti": 9, "door_gear": 10},
     "buckle": 11,  # of the package in docs/extend.md
 }
-"""COCO category of each kind of damage; values of the damage target are category * 100 + instance."""
+"""COCO category of each kind of damage; values of damage targets are category * 100 + instance."""
 
 
 @dataclass
