@@ -88,7 +88,10 @@ def test_a_key_inside_of_another_is_refused(turn):
             "--set: markings.markers.C3_1.art: is missing, and fastgen has no such marker (did you "
             "mean C3.1?)",
         ),
-        ("preset=gate", "--set: preset: another configuration to start from is given already"),
+        (
+            "preset=gate",
+            "--set: preset: only the first of the configurations can start from a preset",
+        ),
     ],
 )
 def test_an_unusable_single_value_gets_one_line(text, words, capsys):
@@ -128,8 +131,16 @@ def test_a_file_may_start_from_a_preset_or_from_another_file(tmp_path, capsys):
         ("preset: 5", [], "{port}: preset: 5 is unknown (choose from crane,"),
         ("preset: port.yaml", [], "{port}: {port}: preset: the file starts from itself"),
         ("preset: gone.yaml", [], "{port}: {gone}: cannot be read"),
-        ("preset: gate", ["--preset", "yard"], "{port}: preset: another configuration to start"),
-        ("preset: gate", ["--config", "{more}"], "{port}: preset: another configuration to start"),
+        (
+            "preset: gate",
+            ["--preset", "yard"],
+            "{port}: preset: only the first of the configurations",
+        ),
+        (
+            "preset: gate",
+            ["--config", "{more}"],
+            "{port}: preset: only the first of the configurations",
+        ),
     ],
 )
 def test_an_unusable_preset_gets_one_line(text, arguments, words, tmp_path, capsys):

@@ -7,6 +7,7 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.labels.crops import text_crops
 from fastgen.light.environment import irradiance_at, load_environment, sky_irradiance
 from fastgen.light.fog import below_fog, transmitted
 from fastgen.light.hdri import bundled_hdris
@@ -127,24 +128,34 @@ def test_shadows_fade_in_fog(generator, scene):
     assert shade[-1] > 0.6
 
 
-def test_objects_beyond_the_visibility_are_ignored(generator, scene):
-    def ignored(visibility_mm):
+def test_objects_of_which_fog_leaves_too_little_are_ignored(generator, scene):
+    least_px, least_share = 12, 0.05
+
+    def seen(visibility_mm):
         shown = replace(scene, weather=Weather(visibility_mm=visibility_mm))
         sample = generator.render(scene=shown, camera=BESIDE)
-        mm = 1000 * sample.depth
-        nearest = {
-            each.id: mm[(sample.ids == each.id)].min(initial=np.inf) for each in sample.objects
-        }
         flags = {each.id: each.ignored for each in sample.objects if each.area}
-        return flags, nearest
-
-    clear, nearest = ignored(0.0)
-    assert sum(not flag for flag in clear.values()) > 5
-    for visibility_mm in (12_000.0, 25_000.0, 100_000.0):
-        flags, _ = ignored(visibility_mm)
-        hidden = {number for number, flag in flags.items() if flag and not clear[number]}
-        assert hidden == {
-            number for number, flag in clear.items() if not flag and nearest[number] > visibility_mm
+        _, rays = sample.view.rays()
+        places_mm = sample.depth[..., None] / (rays @ sample.view.rotation[2])[..., None] * rays
+        near = 1000 * np.linalg.norm(places_mm, axis=-1) <= (visibility_mm or np.inf)
+        own = {
+            each.id: (sample.damage == 101 + each.container)
+            if each.class_name == "container"
+            else (sample.ids == each.id)
+            for each in sample.objects
         }
+        left = {number: (near & mask).sum() for number, mask in own.items()}
+        few = {n for n in flags if left[n] < max(least_px, least_share * own[n].sum())}
+        return flags, few, {item.id for item, _ in text_crops(sample, 2.0)}
+
+    clear, _, legible = seen(0.0)
+    assert legible
+    assert sum(not flag for flag in clear.values()) > 5
+    for visibility_mm in (2_000.0, 9_000.0, 10_500.0, 25_000.0, 100_000.0):
+        flags, few, crops = seen(visibility_mm)
+        hidden = {number for number, flag in flags.items() if flag and not clear[number]}
+        assert hidden == {number for number in few if not clear[number]}
         assert (len(hidden) > 0) == (visibility_mm < 50_000)
-    assert not ignored(25_000.0)[0][1]  # the first container is in sight, the other one is not
+        assert crops == legible - few
+        assert bool(crops) == (visibility_mm > 10_000)
+    assert not seen(25_000.0)[0][1]  # the first container is in sight, the other one is not

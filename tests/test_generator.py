@@ -4,6 +4,7 @@ import contextlib
 import math
 import multiprocessing
 import pickle
+import shutil
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from fastgen.config.config import Config, LabelConfig
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry.shape_library import SHAPES
+from fastgen.light.hdri import bundled_hdris
 from fastgen.resources import asset_path, shader_path
 from fastgen.scene import Camera, Scene
 from fastgen.scene.faces import SHEET_FACES
@@ -158,6 +160,18 @@ def test_hdris_with_the_same_name_are_refused(tmp_path):
         (tmp_path / name).write_bytes(b"")
     with pytest.raises(AssetError, match=r"dusk.exr and dusk.hdr are both called 'dusk'"):
         Generator(hdri_dir=tmp_path)
+
+
+def test_an_own_hdri_with_the_name_of_another_bundled_one_is_refused(tmp_path):
+    bundled = bundled_hdris()
+    shutil.copy(bundled["sky"], tmp_path / "night.exr")
+    with pytest.raises(
+        AssetError, match=r"night\.exr: fastgen has another HDRI .*rename your file"
+    ):
+        Generator(hdri_dir=tmp_path)
+    shutil.copy(bundled["night"], tmp_path / "night.exr")
+    with Generator(hdri_dir=tmp_path, size=(64, 64), quality="draft") as made:
+        assert made.scene(0).environment.name == "night"
 
 
 def test_a_pickled_generator_renders_the_same(generator):

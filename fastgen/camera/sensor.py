@@ -112,7 +112,7 @@ def _through_weather(
     light = frame.radiance
     assert light is not None
     if weather.visibility_mm:
-        stretch, backdrop_m = _along_rays(view, ground)
+        stretch, backdrop_m = along_rays(view, ground)
         ray_m = frame.depth * stretch
         light = add_fog(light, ray_m, frame.cover, weather.visibility_mm, sky, backdrop_m)
     if weather.rain:
@@ -174,8 +174,8 @@ def _developed(light: Light, sensor: Sensor, gain: float) -> NDArray[np.uint8]:
     return image
 
 
-def _along_rays(
-    view: View, ground: Ground | None
+def along_rays(
+    view: View, ground: Ground | None = None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the ray length per unit of depth and the distance of the background, by pixel.
 

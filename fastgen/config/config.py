@@ -98,7 +98,8 @@ class EnvironmentConfig:
         yaw_deg: Rotation of the environment about the vertical.
         illuminance_lx: Light on level ground under the sky of an HDRI, by its name, for cameras
             with a meter (sensor.meter). Bundled HDRIs that are not listed have the estimates of
-            assets/hdri/index.json, and other HDRIs 10,000 lx, which is an overcast day.
+            assets/hdri/index.json, and other HDRIs 10,000 lx, which is an overcast day. Names of
+            HDRIs that are not available have no effect.
         lamps: Floodlights in dark scenes.
     """
 
@@ -369,8 +370,8 @@ def _merged(data: Any, base: Config | None, folder: Path, seen: tuple[Path, ...]
     if isinstance(data, Mapping) and PRESET_KEY in data:
         if base is not None:
             raise ConfigError(
-                f"{PRESET_KEY}: another configuration to start from is given already; remove this "
-                "key, or start from nothing else (--preset, an earlier --config, base)"
+                f"{PRESET_KEY}: only the first of the configurations can start from a preset; use "
+                "--preset, put this file first, or pass no base"
             )
         base = _start(data[PRESET_KEY], folder, seen)
         data = {key: value for key, value in data.items() if key != PRESET_KEY}

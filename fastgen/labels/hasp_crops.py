@@ -57,7 +57,7 @@ def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
     occluded. At least half of its seal is visible, if it has one.
     """
     scene, view = sample.scene, sample.view
-    if not scene.container.present:
+    if not scene.container.present or sample.objects[0].ignored:  # fog may hide the container
         return
     numbers, seals = scene_numbers(scene)[0], {seal.hasp: seal for seal in scene.seals}
     fractions = {thing.id: thing.visible_fraction for thing in sample.objects}

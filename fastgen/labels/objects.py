@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
+from fastgen.camera.sensor import along_rays
 from fastgen.classes import ALL_DAMAGE_CLASSES, SPREADER_ID
 from fastgen.geometry.decal_facets import DecalSurface
 from fastgen.geometry.decal_outlines import EDGE_POINTS
@@ -77,24 +78,31 @@ def label(shot: Shot) -> list[Object]:
 
 
 def _in_fog(shot: Shot, objects: list[Object]) -> list[Object]:
-    """Return the objects, with those ignored that lie beyond the visibility in fog."""
+    """Return the objects, with those ignored of which fog leaves too little.
+
+    Pixels beyond the visibility count as hidden, as the rules of `LabelConfig` want it.
+    """
     visibility_mm = shot.scene.weather.visibility_mm
     if not visibility_mm:
         return objects
-    frame = shot.frame
-    near = frame.depth <= MM * visibility_mm
-    ids, damages = (set(np.unique(each[near]).tolist()) for each in (frame.ids, frame.damage))
+    frame, rules = shot.frame, shot.config.labels
+    stretch, _ = along_rays(shot.view)
+    near = frame.depth * stretch <= MM * visibility_mm
+    ids, damages = (np.bincount(each[near], minlength=65536) for each in (frame.ids, frame.damage))
 
-    def in_sight(item: Object) -> bool:
+    def hidden(item: Object) -> bool:
         if item.class_name in ALL_DAMAGE_CLASSES:
-            return item.id in damages
-        if item.class_name != "container":
-            return item.id in ids
-        numbers = shot.prepared.members[item.container].prepared.numbers
-        return not damages.isdisjoint((numbers.undamaged, *numbers.damages))
+            left = damages[item.id]
+        elif item.class_name == "container":
+            numbers = shot.prepared.members[item.container].prepared.numbers
+            left = damages[[numbers.undamaged, *numbers.damages]].sum()
+        else:
+            left = ids[item.id]
+        return bool(left < max(rules.min_visible_px, rules.min_visible_fraction * item.area))
 
     return [
-        item if item.ignored or in_sight(item) else replace(item, ignored=True) for item in objects
+        replace(item, ignored=True) if not item.ignored and hidden(item) else item
+        for item in objects
     ]
 
 

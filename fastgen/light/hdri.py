@@ -1,6 +1,7 @@
 """HDRI files: bundled and user-supplied environments, and their radiance as arrays."""
 
 import contextlib
+import filecmp
 import hashlib
 import io
 import json
@@ -72,10 +73,17 @@ def hdris_by_name(folder: str | Path) -> dict[str, Path]:
     """Return the HDRIs of a folder by name, see `find_hdris`.
 
     Raises:
-        AssetError: Two file names differ only in their extension.
+        AssetError: Two file names differ only in their extension, or a file has the name of another
+            HDRI that is bundled. Scenes and presets know the light of a bundled HDRI by its name.
     """
     named: dict[str, Path] = {}
+    bundled = bundled_hdris()
     for path in find_hdris(folder):
+        if path.stem in bundled and not filecmp.cmp(path, bundled[path.stem], shallow=False):
+            raise AssetError(
+                f"{path}: fastgen has another HDRI that is called {path.stem!r}, and takes "
+                "brightness and time of day from its name; rename your file"
+            )
         if path.stem in named:
             raise AssetError(
                 f"{folder}: {named[path.stem].name} and {path.name} are both called "
