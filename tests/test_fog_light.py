@@ -1,4 +1,4 @@
-"""Light below fog against photons that are followed one by one; labels of what fog hides."""
+"""Light below fog against simulated photons, and labels of objects in fog."""
 
 from dataclasses import replace
 

@@ -78,9 +78,9 @@ def label(shot: Shot) -> list[Object]:
 
 
 def _in_fog(shot: Shot, objects: list[Object]) -> list[Object]:
-    """Return the objects, with those ignored of which fog leaves too little.
+    """Return the objects; in fog, those with too few pixels within the visibility are ignored.
 
-    Pixels beyond the visibility count as hidden, as the rules of `LabelConfig` want it.
+    The rules of `LabelConfig` say how many pixels, and which share of the visible ones, are enough.
     """
     visibility_mm = shot.scene.weather.visibility_mm
     if not visibility_mm:

@@ -17,15 +17,14 @@ from fastgen.light.environment import (
 from fastgen.light.hdri import HALF_MAX
 
 _LAYER_M = 60.0
-"""Assumed height of the fog. Fog at a quay is some tens of metres high; haze of more visibility is
-higher, but hardly dims the sun."""
+"""Assumed height of fog above the ground; at a quay it is some tens of metres."""
 
 _FORWARD = 0.85
 """Mean cosine of the scattering angle in clouds and fog (Bohren 1987, "Multiple Scattering of Light
 and Some of Its Observable Consequences", American Journal of Physics 55)."""
 
 _LEAST_SHARE = 0.01
-"""Directional lights that keep a smaller share of their light are left out."""
+"""Smallest remaining share of a directional light; below it, the light is dropped."""
 
 _GRID_ROWS = 128
 
@@ -33,8 +32,8 @@ _GRID_ROWS = 128
 def below_fog(light: EnvironmentLight, visibility_mm: float) -> EnvironmentLight:
     """Return the light of an environment below a level layer of fog.
 
-    Fog scatters a part of the light of the directional lights, and most of that reaches the ground
-    from all directions of the sky. The sky itself is taken to be as bright as without fog.
+    Fog scatters a part of the light of directional lights. Most of the scattered light reaches the
+    ground, and is taken to come evenly from the whole sky. Otherwise the sky stays as it is.
 
     Args:
         light: The environment.
