@@ -75,13 +75,13 @@ def readme_lines() -> list[str]:
     equal, ratio = equal_cycles("balanced")
     return _wrapped(
         f"""- **Speed.** {rates["draft"]:.0f} labelled 640x640 images per second with `draft` and
-        {rates["balanced"]:.0f} with `balanced` on two CPU cores ({about["machine"]}, version
+        {rates["balanced"]:.0f} with `balanced` ({about["machine"]}, no GPU, version
         {about["fastgen"]}). Blender Cycles takes {min(traced):.0f} to {max(traced):.0f} s of CPU
         time per image ([benchmarks](docs/benchmarks.md#results)).""",
         f"""- **Accuracy.** `balanced` is as close to a path-traced reference as Cycles with
         {equal.words} samples per pixel ([accuracy](docs/accuracy.md), version
-        {stored("pareto")["fastgen"]}), at 1/{ratio:.0f} of its CPU time on a busy machine
-        ([about twice that](docs/benchmarks.md#distance-to-the-path-tracer) on a faster one).""",
+        {stored("pareto")["fastgen"]}), at 1/{ratio:.0f} of its CPU time
+        ([1/84 on another machine](docs/benchmarks.md#distance-to-the-path-tracer)).""",
         f"""- **Labels.** {label_sentence()} [docs/stability.md](docs/stability.md) lists conditions
         in which renderers and labels fail, with tests.""",
     )
