@@ -263,7 +263,7 @@ class Generator:
     ) -> CudaFrame:
         """Render one frame into CUDA memory, without objects. The next call overwrites it.
 
-        Sensor effects, fog and rain are computed on the CPU and therefore missing here.
+        Sensor effects, rain and the veil of fog are computed on the CPU and therefore missing here.
 
         Raises:
             ConfigError: An argument is not valid or the scene cannot be drawn.

@@ -90,7 +90,7 @@ def test_a_key_inside_of_another_is_refused(turn):
         ),
         (
             "preset=gate",
-            "--set: preset: only the first of the configurations can start from a preset",
+            "--set: preset: is allowed only in the first configuration",
         ),
     ],
 )
@@ -134,12 +134,12 @@ def test_a_file_may_start_from_a_preset_or_from_another_file(tmp_path, capsys):
         (
             "preset: gate",
             ["--preset", "yard"],
-            "{port}: preset: only the first of the configurations",
+            "{port}: preset: is allowed only in the first configuration",
         ),
         (
             "preset: gate",
             ["--config", "{more}"],
-            "{port}: preset: only the first of the configurations",
+            "{port}: preset: is allowed only in the first configuration",
         ),
     ],
 )

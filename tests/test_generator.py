@@ -162,11 +162,11 @@ def test_hdris_with_the_same_name_are_refused(tmp_path):
         Generator(hdri_dir=tmp_path)
 
 
-def test_an_own_hdri_with_the_name_of_another_bundled_one_is_refused(tmp_path):
+def test_a_user_hdri_with_the_name_of_a_bundled_one_is_refused(tmp_path):
     bundled = bundled_hdris()
     shutil.copy(bundled["sky"], tmp_path / "night.exr")
     with pytest.raises(
-        AssetError, match=r"night\.exr: fastgen has another HDRI .*rename your file"
+        AssetError, match=r"night\.exr: has the name of a bundled HDRI .*rename the file"
     ):
         Generator(hdri_dir=tmp_path)
     shutil.copy(bundled["night"], tmp_path / "night.exr")

@@ -189,7 +189,7 @@ def test_labels_do_not_depend_on_the_quality_and_edges_between_containers_are_op
     assert (drawn.cover[seen & ~oracle.near_edge(seen)] == 255).mean() > 0.995
 
 
-def test_containers_that_share_a_shadow_map_look_as_with_a_map_each(generators, scene, monkeypatch):
+def test_sharing_shadow_maps_does_not_change_the_image(generators, scene, monkeypatch):
     lit = replace(scene, environment=EnvironmentView("port_noon", 0.0))
     generator = generators(CONFIG, seed=6, size=SIZE, quality="draft")
     wanted = [generator.render(scene=lit, camera=each).image for each in CAMERAS[:2]]

@@ -166,7 +166,7 @@ def test_a_state_fits_only_loaders_with_the_same_hdris(tmp_path):
     folders = [tmp_path / name for name in ("one", "moved", "other")]
     for folder, level in zip(folders, (0.5, 0.5, 0.7), strict=True):
         folder.mkdir()
-        picture(folder / "sky.hdr", level)
+        picture(folder / "own.hdr", level)
     one, moved, other = (Loader(lit_by(folder)) for folder in folders)
     state = json.loads(json.dumps(one.state_dict()))
     moved.load_state_dict(state)  # another path with the same bytes

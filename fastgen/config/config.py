@@ -178,7 +178,7 @@ class LabelConfig:
             regions list them as such; other formats leave them out.
         min_visible_fraction: Objects with a smaller visible fraction are ignored as well. The
             fraction is relative to their pixels if nothing hid them, or to the pixels of the image
-            if these are fewer.
+            if these are fewer. In fog, pixels beyond the visibility count as hidden for both.
         min_text_px: Height below which a text is not a legible crop.
         background: Containers of the panorama, which are known in the bundled ports. "ignore" marks
             them as ignored, "label" labels them as containers, "none" leaves them out, as the paper
@@ -370,8 +370,8 @@ def _merged(data: Any, base: Config | None, folder: Path, seen: tuple[Path, ...]
     if isinstance(data, Mapping) and PRESET_KEY in data:
         if base is not None:
             raise ConfigError(
-                f"{PRESET_KEY}: only the first of the configurations can start from a preset; use "
-                "--preset, put this file first, or pass no base"
+                f"{PRESET_KEY}: is allowed only in the first configuration; remove this key, or "
+                "remove the other one (--preset, an earlier --config, base)"
             )
         base = _start(data[PRESET_KEY], folder, seen)
         data = {key: value for key, value in data.items() if key != PRESET_KEY}

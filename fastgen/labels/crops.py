@@ -95,7 +95,8 @@ def upright_crop(image: NDArray[np.uint8], quad: NDArray[np.float64]) -> NDArray
 def _legible(sample: Sample, item: Object, decals: Mapping[int, Decal], min_text_px: float) -> bool:
     """Test whether a text is large enough along both sides, inside the image, and hardly occluded.
 
-    At most half of each letter may be occluded. An ignored text is not legible: fog hides it.
+    At most half of each letter may be occluded. Ignored texts, as those hidden by fog, are not
+    legible.
     """
     if item.bbox is None or item.truncated or item.visible_fraction < _LEGIBLE_FRACTION:
         return False

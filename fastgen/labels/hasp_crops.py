@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fastgen.geometry.seals import hasps_mm
 from fastgen.labels.crops import upright_crop
+from fastgen.labels.visibility import within_visibility
 from fastgen.sample import Sample
 from fastgen.scene.limits import HASPS
 from fastgen.scene.object_ids import scene_numbers
@@ -53,11 +54,11 @@ class HaspCrop:
 def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
     """Yield the hasps of a door that an image shows well.
 
-    Such a hasp is inside the image, at least LEAST_PX large, not seen along the door, and hardly
-    occluded. At least half of its seal is visible, if it has one.
+    Such a hasp is inside the image, at least LEAST_PX large, not seen along the door, hardly
+    occluded, and within the visibility in fog. At least half of its seal is visible, if it has one.
     """
     scene, view = sample.scene, sample.view
-    if not scene.container.present or sample.objects[0].ignored:  # fog may hide the container
+    if not scene.container.present:
         return
     numbers, seals = scene_numbers(scene)[0], {seal.hasp: seal for seal in scene.seals}
     fractions = {thing.id: thing.visible_fraction for thing in sample.objects}
@@ -72,11 +73,11 @@ def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
     within = np.logical_and(pixels >= 0, pixels < view.size)
     inside = np.asarray(within.all(axis=1) & (depth > 0))
     columns, rows = np.floor(np.where(inside[:, None], pixels, 0)).astype(int).T
-    shown = (
-        np.asarray(np.isin(sample.damage[rows, columns], [numbers.undamaged, *numbers.damages]))
-        .reshape(HASPS, -1)
-        .mean(axis=1)
-    )
+    own = np.isin(sample.damage[rows, columns], [numbers.undamaged, *numbers.damages])
+    if scene.weather.visibility_mm:
+        near = within_visibility(sample.depth, view, scene.weather.visibility_mm)
+        own &= near[rows, columns]
+    shown = own.reshape(HASPS, -1).mean(axis=1)
     whole = np.asarray(inside.reshape(HASPS, -1).all(axis=1))
     for hasp, grid in enumerate(pixels.reshape(HASPS, _POINTS, _POINTS, 2)):
         quad = grid[[0, 0, -1, -1], [0, -1, -1, 0]]

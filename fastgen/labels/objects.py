@@ -1,5 +1,6 @@
 """Labels of one image: boxes, areas and visibility of all labelled objects."""
 
+import math
 from collections import Counter
 from dataclasses import replace
 
@@ -8,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
-from fastgen.camera.sensor import along_rays
 from fastgen.classes import ALL_DAMAGE_CLASSES, SPREADER_ID
 from fastgen.geometry.decal_facets import DecalSurface
 from fastgen.geometry.decal_outlines import EDGE_POINTS
@@ -18,7 +18,13 @@ from fastgen.geometry.ray_triangles import RayTriangles
 from fastgen.labels.coverage import boxes, covered, facing, pixels_beyond, project
 from fastgen.labels.damage import damage_objects
 from fastgen.labels.seals import seal_objects
-from fastgen.labels.visibility import Shot, float_boxes, mask_box, visibility
+from fastgen.labels.visibility import (
+    Shot,
+    float_boxes,
+    mask_box,
+    visibility,
+    within_visibility,
+)
 from fastgen.sample import Keypoint, LabelledPart, Object
 from fastgen.scene import Decal, Scene
 from fastgen.scene.limits import MM, NEAR_M
@@ -60,7 +66,7 @@ def label(shot: Shot) -> list[Object]:
     if not shot.scene.container.present:
         return []
     if not shot.scene.neighbours:
-        return _in_fog(shot, _label(shot))
+        return _ignore_hidden_by_fog(shot, _label(shot))
     found: list[Object] = []
     for member in shot.prepared.members:
         before = Counter(item.class_name for item in found)
@@ -74,20 +80,19 @@ def label(shot: Shot) -> list[Object]:
             )
             for item in _label(shot.of_member(member))
         ]
-    return _in_fog(shot, found)
+    return _ignore_hidden_by_fog(shot, found)
 
 
-def _in_fog(shot: Shot, objects: list[Object]) -> list[Object]:
-    """Return the objects; in fog, those with too few pixels within the visibility are ignored.
+def _ignore_hidden_by_fog(shot: Shot, objects: list[Object]) -> list[Object]:
+    """Mark objects as ignored that have too few pixels within the visibility in fog.
 
-    The rules of `LabelConfig` say how many pixels, and which share of the visible ones, are enough.
+    The rules of `visibility` apply, with all other pixels hidden.
     """
     visibility_mm = shot.scene.weather.visibility_mm
     if not visibility_mm:
         return objects
-    frame, rules = shot.frame, shot.config.labels
-    stretch, _ = along_rays(shot.view)
-    near = frame.depth * stretch <= MM * visibility_mm
+    frame, rules, image = shot.frame, shot.config.labels, math.prod(shot.view.size)
+    near = within_visibility(frame.depth, shot.view, visibility_mm)
     ids, damages = (np.bincount(each[near], minlength=65536) for each in (frame.ids, frame.damage))
 
     def hidden(item: Object) -> bool:
@@ -98,7 +103,8 @@ def _in_fog(shot: Shot, objects: list[Object]) -> list[Object]:
             left = damages[[numbers.undamaged, *numbers.damages]].sum()
         else:
             left = ids[item.id]
-        return bool(left < max(rules.min_visible_px, rules.min_visible_fraction * item.area))
+        whole = min(item.area / item.visible_fraction, image)
+        return bool(left < rules.min_visible_px or left < rules.min_visible_fraction * whole)
 
     return [
         replace(item, ignored=True) if not item.ignored and hidden(item) else item

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
+from fastgen.camera.sensor import along_rays
 from fastgen.classes import DAMAGE_VALUES, SPREADER_ID
 from fastgen.config.config import Config
 from fastgen.frame import Frame
@@ -16,6 +17,7 @@ from fastgen.geometry.prepared_scene import Member, PreparedScene
 from fastgen.geometry.solids import Body
 from fastgen.sample import Box
 from fastgen.scene import Scene
+from fastgen.scene.limits import MM
 
 FloatBox = tuple[float, float, float, float]
 
@@ -109,6 +111,21 @@ class Shot:
     def spreader_box(self) -> Box | None:
         """Tight box of the visible spreader."""
         return mask_box(self.spreader_shown) if self.prepared.spreader else None
+
+
+def within_visibility(
+    depth_m: NDArray[np.float32], view: View, visibility_mm: float
+) -> NDArray[np.bool_]:
+    """Return which pixels [H, W] are no farther away, along their ray, than the visibility in fog.
+
+    Args:
+        depth_m: Depth [H, W] along the optical axis.
+        view: Projection of the camera.
+        visibility_mm: Visibility, above 0.
+    """
+    per_depth, _ = along_rays(view)
+    near: NDArray[np.bool_] = depth_m * per_depth <= MM * visibility_mm
+    return near
 
 
 class Visibility(TypedDict):

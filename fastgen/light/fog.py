@@ -1,4 +1,4 @@
-"""Light of an environment below a layer of fog: dimmer directional lights, and a brighter sky."""
+"""Light of an environment in fog: a dimmer sun and a brighter sky."""
 
 from dataclasses import replace
 from functools import cache
@@ -12,66 +12,62 @@ from fastgen.light.environment import (
     IRRADIANCE_SIZE,
     ROUGHNESS_LEVELS,
     SPECULAR_SIZE,
+    Ambient,
     EnvironmentLight,
 )
 from fastgen.light.hdri import HALF_MAX
 
 _LAYER_M = 60.0
-"""Assumed height of fog above the ground; at a quay it is some tens of metres."""
+"""Assumed thickness of the fog layer, from the ground up."""
 
 _FORWARD = 0.85
 """Mean cosine of the scattering angle in clouds and fog (Bohren 1987, "Multiple Scattering of Light
 and Some of Its Observable Consequences", American Journal of Physics 55)."""
 
 _LEAST_SHARE = 0.01
-"""Smallest remaining share of a directional light; below it, the light is dropped."""
+"""Share of its light below which the sun is left out."""
 
 _GRID_ROWS = 128
 
 
-def below_fog(light: EnvironmentLight, visibility_mm: float) -> EnvironmentLight:
-    """Return the light of an environment below a level layer of fog.
+def has_sun(light: Ambient) -> bool:
+    """Return whether an environment has a sun: one directional light, above the horizon.
 
-    Fog scatters a part of the light of directional lights. Most of the scattered light reaches the
-    ground, and is taken to come evenly from the whole sky. Otherwise the sky stays as it is.
+    Several lights are lamps. They are near, and their distance is unknown.
+    """
+    return len(light.lights) == 1 and light.lights[0].direction[2] > 0
+
+
+def in_fog(light: EnvironmentLight, visibility_mm: float) -> EnvironmentLight:
+    """Return the light at the bottom of a level layer of fog.
+
+    The layer attenuates the sun. The part of the lost light that reaches the ground comes evenly
+    from the whole sky. The light of the sky itself is not attenuated. `luminance`, which exposure
+    meters read, stays that of clear weather.
 
     Args:
-        light: The environment.
+        light: An environment that has a sun, see `has_sun`.
         visibility_mm: Meteorological visibility.
-
-    Returns:
-        `light` itself if it has no directional lights above the horizon.
     """
-    depth = CONTRAST * _LAYER_M * 1e3 / visibility_mm
-    added = np.zeros(3)
-    lights = []
-    for each in light.lights:
-        rise = each.direction[2]
-        if rise <= 0:
-            lights.append(each)
-            continue
-        direct, total = transmitted(depth, rise)
-        added += rise * (total - direct) * np.array(each.light)
-        if direct > _LEAST_SHARE:
-            r, g, b = (direct * np.array(each.light)).tolist()
-            lights.append(replace(each, light=(r, g, b)))
-    if not added.any():
-        return light
-    scattered = added.astype(np.float32)
+    (sun,) = light.lights
+    rise = sun.direction[2]
+    direct, total = transmitted(CONTRAST * _LAYER_M * 1e3 / visibility_mm, rise)
+    r, g, b = (direct * np.array(sun.light)).tolist()
+    scattered = (rise * (total - direct) * np.array(sun.light)).astype(np.float32)
     toward, _ = octahedral.octahedral_texels(light.sky.shape[0])
     above = (1 + np.sign(toward[:, 2].round(6))) / 2  # half of a cell on the horizon is above it
     shown = above.astype(np.float32).reshape(*light.sky.shape[:2], 1)
     return replace(
         light,
-        lights=tuple(lights),
+        lights=(replace(sun, light=(r, g, b)),) if direct > _LEAST_SHARE else (),
         sky=light.sky + shown * scattered,
         irradiance=_plus(light.irradiance, _half_sky_irradiance() * scattered),
-        specular=_plus(light.specular, _half_sky_mirrored() * scattered),
+        specular=_plus(light.specular, _half_sky_specular() * scattered),
     )
 
 
 def transmitted(optical_depth: float, cosine: float) -> tuple[float, float]:
-    """Return the shares of sunlight that reach the ground through a layer that absorbs nothing.
+    """Return the shares of sunlight that reach the ground through a non-absorbing layer.
 
     Eddington's approximation over a black ground (Shettle and Weinman 1970, "The Transfer of Solar
     Irradiance through Inhomogeneous Turbid Atmospheres Evaluated by Eddington's Approximation",
@@ -82,7 +78,7 @@ def transmitted(optical_depth: float, cosine: float) -> tuple[float, float]:
         cosine: Cosine of the angle between the sun and the vertical, above 0.
 
     Returns:
-        The direct share (Beer-Lambert) and the whole share, scattered light included.
+        The direct share (Beer-Lambert), and the total share of direct and scattered light.
     """
     direct = float(np.exp(-optical_depth / cosine))
     total = (2 / 3 + cosine + (2 / 3 - cosine) * direct) / (4 / 3 + (1 - _FORWARD) * optical_depth)
@@ -110,7 +106,7 @@ def _half_sky_irradiance() -> NDArray[np.float32]:
 
 
 @cache
-def _half_sky_mirrored() -> NDArray[np.float32]:
+def _half_sky_specular() -> NDArray[np.float32]:
     """Return `_half_sky` convolved as EnvironmentLight.specular, [L, N, N, 3]."""
     layers = [
         octahedral.resample_octahedral(

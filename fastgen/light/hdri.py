@@ -72,17 +72,19 @@ def find_hdris(folder: str | Path) -> list[Path]:
 def hdris_by_name(folder: str | Path) -> dict[str, Path]:
     """Return the HDRIs of a folder by name, see `find_hdris`.
 
+    The brightness and the time of day of bundled HDRIs are looked up by name.
+
     Raises:
-        AssetError: Two file names differ only in their extension, or a file has the name of another
-            HDRI that is bundled. Scenes and presets know the light of a bundled HDRI by its name.
+        AssetError: Two file names differ only in their extension, or a file has the name of a
+            bundled HDRI but other content.
     """
     named: dict[str, Path] = {}
     bundled = bundled_hdris()
     for path in find_hdris(folder):
-        if path.stem in bundled and not filecmp.cmp(path, bundled[path.stem], shallow=False):
+        if path.stem in bundled and not _same_content(path, bundled[path.stem]):
             raise AssetError(
-                f"{path}: fastgen has another HDRI that is called {path.stem!r}, and takes "
-                "brightness and time of day from its name; rename your file"
+                f"{path}: has the name of a bundled HDRI but other content; rename the file, "
+                "because brightness and time of day are looked up by name"
             )
         if path.stem in named:
             raise AssetError(
@@ -91,6 +93,14 @@ def hdris_by_name(folder: str | Path) -> dict[str, Path]:
             )
         named[path.stem] = path
     return named
+
+
+def _same_content(path: Path, other: Path) -> bool:
+    """Return whether two files are equal; True for files that cannot be read, see `_opened`."""
+    try:
+        return filecmp.cmp(path, other, shallow=False)
+    except OSError:
+        return True
 
 
 _HOURS = {"dawn": (5, 7), "sunset": (17, 20), "dusk": (18, 21), "night": (21, 28)}

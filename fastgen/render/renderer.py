@@ -363,7 +363,7 @@ class Renderer:
         return self._lights.shadows.of(0)
 
     def ambient(self, scene: Scene) -> Ambient:
-        """Return the light of a scene's environment, below its fog, and of its lamps."""
+        """Return the light of a scene's environment in its fog, and of its lamps."""
         return self._lights.ambient(scene)
 
     def bake(self, prepared: PreparedScene, texel_mm: float) -> Atlas:

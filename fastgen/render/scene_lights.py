@@ -9,7 +9,7 @@ from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.exposure import metered_exposure
-from fastgen.light.fog import below_fog
+from fastgen.light.fog import has_sun, in_fog
 from fastgen.light.ground_light import mean_albedo
 from fastgen.light.lamps import unit_luminance, with_lamps
 from fastgen.light.surrounding_change import SurroundingLight
@@ -45,6 +45,7 @@ class SceneLights:
         self._light_of = light
         self._traced = quality.traced
         self._lights: ReleasingCache[GpuLight] = ReleasingCache(24)
+        self._sunny: RecentCache[EnvironmentLight] = RecentCache(4)
         self._foggy: ReleasingCache[GpuLight] = ReleasingCache(2)
         self._backgrounds = BackgroundTextures(gl)
         self._lit: RecentCache[Ambient] = RecentCache(4)
@@ -52,15 +53,16 @@ class SceneLights:
         self.shadows = Shadows(gl.ctx, quality.shadow_detail)
 
     def of(self, scene: Scene) -> GpuLight:
-        """Return the light of a scene's environment, below its fog, without its lamps."""
+        """Return the light of a scene's environment in its fog, without its lamps."""
         name, visibility_mm = scene.environment.name, scene.weather.visibility_mm
-        if not visibility_mm or not self._clear(name).ambient.lights:
+        if not visibility_mm or not has_sun(self._clear(name).ambient):
             return self._clear(name)
 
-        def below() -> GpuLight:
-            return GpuLight(self._gl, below_fog(self._light_of(name), visibility_mm), self._traced)
+        def foggy() -> GpuLight:
+            clear = self._sunny.get(name, lambda: self._light_of(name))
+            return GpuLight(self._gl, in_fog(clear, visibility_mm), self._traced)
 
-        return self._foggy.get((name, visibility_mm), below)
+        return self._foggy.get((name, visibility_mm), foggy)
 
     def _clear(self, name: str) -> GpuLight:
         """Return the light of an environment without fog."""

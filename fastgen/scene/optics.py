@@ -250,7 +250,7 @@ class Rain:
 
 @dataclass(frozen=True)
 class Weather:
-    """Weather between camera and container, and water on the container.
+    """Fog and rain before the camera, and water on the container. Fog also dims the sun.
 
     Attributes:
         visibility_mm: Visibility in fog; 0 without fog.
