@@ -1,6 +1,6 @@
 """Measure how the cost of an image grows with pixels, markers, damage, light, workers and count.
 
-    python bench/growth.py [--images 400] [--parts pixels,markers,damages,hdri,workers,length]
+    python bench/growth.py [--images 400] [--parts pixels,markers,damages,hdri,workers]
     python bench/growth.py --parts length --images 20000     # a long run: rate and memory
     python bench/growth.py --redraw     # docs/growth.png from the stored results
 
@@ -309,7 +309,7 @@ def _draw_length(axes: Axes, table: Table) -> None:
 def main() -> None:
     """Measure the requested parts, print them and draw the chart."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--parts", default="pixels,markers,damages,hdri,workers,length")
+    parser.add_argument("--parts", default="pixels,markers,damages,hdri,workers")
     parser.add_argument("--images", type=int, default=400, help="images of the long run")
     parser.add_argument("--size", default="640x640", help="image size of the long run")
     parser.add_argument(

@@ -45,7 +45,7 @@ class SceneLights:
         self._light_of = light
         self._traced = quality.traced
         self._lights: ReleasingCache[GpuLight] = ReleasingCache(24)
-        self._sunny: RecentCache[EnvironmentLight] = RecentCache(4)
+        self._sunny: RecentCache[EnvironmentLight] = RecentCache(2)
         self._foggy: ReleasingCache[GpuLight] = ReleasingCache(2)
         self._backgrounds = BackgroundTextures(gl)
         self._lit: RecentCache[Ambient] = RecentCache(4)
