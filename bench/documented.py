@@ -25,8 +25,8 @@ SECTIONS = {
 
 
 _EXPLAINED = (
-    "one at a fold of a roof, where rounding by 0.003 pixels decides how deep the sheet lies and "
-    "whether it is scraped",
+    "The exception is at a fold of a roof, where rounding by 0.003 pixels decides whether the "
+    "sheet is scraped.",
 )
 """Causes of the differences in bench/results/label_accuracy.json that are not at an edge: scene 12
 of `yard`, camera pole_door, pixel (211, 160) at 256x256. The floor of the corrugation is 10.0 mm
@@ -69,12 +69,13 @@ def label_sentence() -> str:
         raise SystemExit(
             f"label_accuracy: {unexplained} differences are not at an edge; explain them first"
         )
-    others = "".join(f", except {each}" for each in _EXPLAINED[:unexplained])
-    return (
+    sentences = (
         f"With version {found['fastgen']}, {labels} labels and {depth} depths of "
-        f"{pixels / 1e6:.1f} million pixels differ from independently cast rays, all within 0.01 "
-        f"pixels of an edge{others}."
+        f"{pixels / 1e6:.1f} million pixels differ from independently cast rays.",
+        f"All{f' except {unexplained}' if unexplained else ''} are within 0.01 pixels of an edge.",
+        *_EXPLAINED[:unexplained],
     )
+    return " ".join(sentences)
 
 
 def readme_lines() -> list[str]:

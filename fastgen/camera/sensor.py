@@ -7,6 +7,7 @@ exposure.
 """
 
 from dataclasses import replace
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -174,8 +175,9 @@ def _developed(light: Light, sensor: Sensor, gain: float) -> NDArray[np.uint8]:
     return image
 
 
+@lru_cache(maxsize=1)  # the camera model and the labels of an image in fog need the same
 def along_rays(
-    view: View, ground: Ground | None = None
+    view: View, ground: Ground | None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the ray length per unit of depth and the distance of the background, by pixel.
 

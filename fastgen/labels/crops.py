@@ -98,9 +98,8 @@ def _legible(sample: Sample, item: Object, decals: Mapping[int, Decal], min_text
     At most half of each letter may be occluded. Ignored texts, as those hidden by fog, are not
     legible.
     """
-    if item.bbox is None or item.truncated or item.visible_fraction < _LEGIBLE_FRACTION:
-        return False
-    if item.ignored:
+    hidden = item.ignored or item.visible_fraction < _LEGIBLE_FRACTION
+    if item.bbox is None or item.truncated or hidden:
         return False
     decal = decals[item.id]
     upper_left, _, lower_right, lower_left = np.array(item.quad).reshape(4, 2)

@@ -75,8 +75,7 @@ def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
     columns, rows = np.floor(np.where(inside[:, None], pixels, 0)).astype(int).T
     own = np.isin(sample.damage[rows, columns], [numbers.undamaged, *numbers.damages])
     if scene.weather.visibility_mm:
-        near = within_visibility(sample.depth, view, scene.weather.visibility_mm)
-        own &= near[rows, columns]
+        own &= within_visibility(sample.depth, view, scene)[rows, columns]
     shown = own.reshape(HASPS, -1).mean(axis=1)
     whole = np.asarray(inside.reshape(HASPS, -1).all(axis=1))
     for hasp, grid in enumerate(pixels.reshape(HASPS, _POINTS, _POINTS, 2)):

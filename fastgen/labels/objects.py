@@ -1,6 +1,5 @@
 """Labels of one image: boxes, areas and visibility of all labelled objects."""
 
-import math
 from collections import Counter
 from dataclasses import replace
 
@@ -22,6 +21,7 @@ from fastgen.labels.visibility import (
     Shot,
     float_boxes,
     mask_box,
+    too_little,
     visibility,
     within_visibility,
 )
@@ -86,13 +86,12 @@ def label(shot: Shot) -> list[Object]:
 def _ignore_hidden_by_fog(shot: Shot, objects: list[Object]) -> list[Object]:
     """Mark objects as ignored that have too few pixels within the visibility in fog.
 
-    The rules of `visibility` apply, with all other pixels hidden.
+    All other pixels count as hidden.
     """
-    visibility_mm = shot.scene.weather.visibility_mm
-    if not visibility_mm:
+    if not shot.scene.weather.visibility_mm:
         return objects
-    frame, rules, image = shot.frame, shot.config.labels, math.prod(shot.view.size)
-    near = within_visibility(frame.depth, shot.view, visibility_mm)
+    frame, size = shot.frame, shot.view.size
+    near = within_visibility(frame.depth, shot.view, shot.scene)
     ids, damages = (np.bincount(each[near], minlength=65536) for each in (frame.ids, frame.damage))
 
     def hidden(item: Object) -> bool:
@@ -103,8 +102,7 @@ def _ignore_hidden_by_fog(shot: Shot, objects: list[Object]) -> list[Object]:
             left = damages[[numbers.undamaged, *numbers.damages]].sum()
         else:
             left = ids[item.id]
-        whole = min(item.area / item.visible_fraction, image)
-        return bool(left < rules.min_visible_px or left < rules.min_visible_fraction * whole)
+        return too_little(shot.config, size, int(left), item.area / item.visible_fraction)
 
     return [
         replace(item, ignored=True) if not item.ignored and hidden(item) else item

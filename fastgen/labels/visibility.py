@@ -113,18 +113,16 @@ class Shot:
         return mask_box(self.spreader_shown) if self.prepared.spreader else None
 
 
-def within_visibility(
-    depth_m: NDArray[np.float32], view: View, visibility_mm: float
-) -> NDArray[np.bool_]:
-    """Return which pixels [H, W] are no farther away, along their ray, than the visibility in fog.
+def within_visibility(depth_m: NDArray[np.float32], view: View, scene: Scene) -> NDArray[np.bool_]:
+    """Return the pixels [H, W] whose surface is within the visibility, along the ray, in fog.
 
     Args:
         depth_m: Depth [H, W] along the optical axis.
         view: Projection of the camera.
-        visibility_mm: Visibility, above 0.
+        scene: A scene with fog.
     """
-    per_depth, _ = along_rays(view)
-    near: NDArray[np.bool_] = depth_m * per_depth <= MM * visibility_mm
+    per_depth, _ = along_rays(view, scene.ground)
+    near: NDArray[np.bool_] = depth_m * per_depth <= MM * scene.weather.visibility_mm
     return near
 
 
@@ -154,14 +152,25 @@ def visibility(
     """
     whole = area + hidden + beyond
     fraction = area / whole if whole else 0.0
-    rules, image = config.labels, size[0] * size[1]
-    shown = area / min(whole, image) if whole else 0.0
     return {
         "visible_fraction": fraction,
         "truncated": bool(area) and beyond > 0,
         "occluded": bool(area) and hidden > max(_EDGE_PX, _EDGE_SHARE * (area + hidden)),
-        "ignored": area < rules.min_visible_px or shown < rules.min_visible_fraction,
+        "ignored": too_little(config, size, area, whole),
     }
+
+
+def too_little(config: Config, size: tuple[int, int], pixels: int, whole: float) -> bool:
+    """Return whether an object is ignored because of its visible pixels.
+
+    Args:
+        config: Configuration with the label rules.
+        size: (width, height) of the image in pixels.
+        pixels: Visible pixels of the object.
+        whole: Pixels that the object would cover alone in an image without borders.
+    """
+    shown = pixels / min(whole, size[0] * size[1]) if whole else 0.0
+    return pixels < config.labels.min_visible_px or shown < config.labels.min_visible_fraction
 
 
 def mask_box(mask: NDArray[np.bool_]) -> Box | None:

@@ -122,10 +122,12 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
 
     cells = prefilter.shrink(narrow, _LUMINANCE_WIDTH) @ REC_709.astype(np.float32)
     packed = rgb9e5.packed(background)
-    return _light(name, _half(np.stack(layers)), _half(irradiance), packed, cells, lights)
+    layers_half, irradiance_half = half_floats(np.stack(layers)), half_floats(irradiance)
+    return _light(name, layers_half, irradiance_half, packed, cells, lights)
 
 
-def _half(radiance: NDArray[np.float32]) -> NDArray[np.float16]:
+def half_floats(radiance: NDArray[np.float32]) -> NDArray[np.float16]:
+    """Return radiance as half floats, the format of the maps on a GPU."""
     return np.minimum(radiance, HALF_MAX).astype(np.float16)
 
 

@@ -14,8 +14,8 @@ from fastgen.light.environment import (
     SPECULAR_SIZE,
     Ambient,
     EnvironmentLight,
+    half_floats,
 )
-from fastgen.light.hdri import HALF_MAX
 
 _LAYER_M = 60.0
 """Assumed thickness of the fog layer, from the ground up."""
@@ -25,7 +25,7 @@ _FORWARD = 0.85
 and Some of Its Observable Consequences", American Journal of Physics 55)."""
 
 _LEAST_SHARE = 0.01
-"""Share of its light below which the sun is left out."""
+"""Least share of its light that the sun must keep to remain a directional light."""
 
 _GRID_ROWS = 128
 
@@ -61,8 +61,8 @@ def in_fog(light: EnvironmentLight, visibility_mm: float) -> EnvironmentLight:
         light,
         lights=(replace(sun, light=(r, g, b)),) if direct > _LEAST_SHARE else (),
         sky=light.sky + shown * scattered,
-        irradiance=_plus(light.irradiance, _half_sky_irradiance() * scattered),
-        specular=_plus(light.specular, _half_sky_specular() * scattered),
+        irradiance=_rounded(light.irradiance + _half_sky_irradiance() * scattered),
+        specular=_rounded(light.specular + _half_sky_specular() * scattered),
     )
 
 
@@ -85,9 +85,9 @@ def transmitted(optical_depth: float, cosine: float) -> tuple[float, float]:
     return direct, min(max(total, direct), 1.0)
 
 
-def _plus(radiance: NDArray[np.float32], added: NDArray[np.float32]) -> NDArray[np.float32]:
-    half = np.minimum(radiance + added, HALF_MAX).astype(np.float16)
-    return np.asarray(half, np.float32)
+def _rounded(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return radiance as EnvironmentLight holds it."""
+    return half_floats(radiance).astype(np.float32)
 
 
 @cache

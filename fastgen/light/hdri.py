@@ -1,7 +1,6 @@
 """HDRI files: bundled and user-supplied environments, and their radiance as arrays."""
 
 import contextlib
-import filecmp
 import hashlib
 import io
 import json
@@ -76,12 +75,13 @@ def hdris_by_name(folder: str | Path) -> dict[str, Path]:
 
     Raises:
         AssetError: Two file names differ only in their extension, or a file has the name of a
-            bundled HDRI but other content.
+            bundled HDRI but cannot be read or has other content.
     """
     named: dict[str, Path] = {}
     bundled = bundled_hdris()
     for path in find_hdris(folder):
-        if path.stem in bundled and not _same_content(path, bundled[path.stem]):
+        same_name = bundled.get(path.stem)
+        if same_name and content_hash(path) != content_hash(same_name):
             raise AssetError(
                 f"{path}: has the name of a bundled HDRI but other content; rename the file, "
                 "because brightness and time of day are looked up by name"
@@ -93,14 +93,6 @@ def hdris_by_name(folder: str | Path) -> dict[str, Path]:
             )
         named[path.stem] = path
     return named
-
-
-def _same_content(path: Path, other: Path) -> bool:
-    """Return whether two files are equal; True for files that cannot be read, see `_opened`."""
-    try:
-        return filecmp.cmp(path, other, shallow=False)
-    except OSError:
-        return True
 
 
 _HOURS = {"dawn": (5, 7), "sunset": (17, 20), "dusk": (18, 21), "night": (21, 28)}

@@ -9,8 +9,8 @@ from fastgen.render.depth_map import occluder_program
 from fastgen.render.shadow_map import ShadowMap
 
 _MAPS = 8
-"""Largest number of maps. Further containers share the last map, which each image draws again for
-each of them. A map takes 3 MB in draft quality and 21 MB in balanced quality."""
+"""Largest number of maps. Further containers share the last map, so each image draws it again for
+every one. A map takes 3 MB in draft quality and 21 MB in balanced quality."""
 
 
 class Shadows:
