@@ -100,7 +100,7 @@ __all__ = [
     "grid",
     "to_trimesh",
 ]
-__version__ = "0.44.0"
+__version__ = "0.45.0"
 
 _HOMES = {
     "Config": "config.config",

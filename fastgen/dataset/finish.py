@@ -12,7 +12,7 @@ from fastgen.dataset.seal import Sums, digest, seal
 from fastgen.dataset.shards import MADE_BY
 from fastgen.dataset.storage import Folder, Storage
 from fastgen.errors import OutputError
-from fastgen.files.images import encode_picture
+from fastgen.files.images import png
 from fastgen.formats.card import card
 from fastgen.formats.format import Format, Record
 from fastgen.formats.registry import formats_for
@@ -78,7 +78,7 @@ def finish(
                     put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
         if isinstance(storage, Folder) and images:
             sheet = contact_sheet(storage.root, images, formats)
-            put(CONTACT_SHEET, [encode_picture(sheet, ".png")])
+            put(CONTACT_SHEET, [png(sheet)])
     result = {
         **settings,
         **makers[0],

@@ -8,8 +8,11 @@ from fastgen.formats.registry import SEAFRONT
 from fastgen.generator import Generator
 from fastgen.render.settings import RenderSettings
 
-SHARD_SCENES = {"seafront": 4, "webdataset": 64, "parquet": 64}
-"""Default number of scenes per shard in each layout."""
+SHARD_SCENES = {"seafront": 2, "webdataset": 64, "parquet": 64}
+"""Default number of scenes per shard in each layout.
+
+Small shards share few scenes evenly among workers. Archives need large ones.
+"""
 
 LAYOUTS = tuple(SHARD_SCENES)
 
