@@ -134,8 +134,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--quality", nargs="+", default=["draft", "balanced"])
     parser.add_argument("--size", default="640x640")
-    parser.add_argument("--scenes", type=int, default=40)
+    parser.add_argument("--scenes", type=int, default=40, help="at least 4")
     options = parser.parse_args(argv)
+    if options.scenes < 4:
+        parser.error(f"--scenes: {options.scenes} is too few; give at least 4")
     size = parse_size(options.size)
     results: dict[str, Any] = {**origin(), "size": options.size}
     results["cost"] = {q: cost(q, size, options.scenes // 4) for q in options.quality}

@@ -5,12 +5,15 @@ import math
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
+from fastgen.light.environment import load_environment, sky_irradiance
+from fastgen.light.hdri import bundled_hdris
 from fastgen.scene.check import check_scene
 from fastgen.scene.container_kinds import KINDS
 
@@ -44,6 +47,18 @@ def hue_of(name):
 
 def near(share, expected, count=COUNT):
     return abs(share - expected) < 4 * math.sqrt(expected * (1 - expected) / count)
+
+
+@pytest.mark.parametrize("preset", REAL)
+def test_rain_falls_in_a_seventh_of_the_scenes_and_under_clouds(scenes, preset):
+    rainy = [scene.environment.name for scene in scenes[preset] if scene.weather.rain]
+    assert near(len(rainy) / COUNT, 0.15)
+    for name in {*rainy}:
+        light = load_environment(bundled_hdris()[name])
+        up = np.array([[0, 0, 1]], np.float32)
+        if len(light.lights) == 1:  # several lights are lamps
+            (sun,) = light.lights
+            assert sun.direction[2] * np.mean(sun.light) < sky_irradiance(light, up, 0.0).mean()
 
 
 @pytest.mark.parametrize("preset", REAL)

@@ -92,7 +92,12 @@ _OUTDOORS: dict[str, Any] = {
     "environment": {"lamps": {"probability": 0.6}},
     "labels": {"background": "ignore"},
     "seals": {"probability": 0.7},
-    "weather": {"fog_probability": 0.12, "rain_probability": 0.15, "wet_probability": 0.1},
+    "weather": {
+        "fog_probability": 0.12,
+        "rain_probability": 0.35,
+        "rain_up_to_lx": 10_000.0,  # of the sunny panoramas, only one of a golden hour is darker
+        "wet_probability": 0.1,
+    },
 }
 """Damage, paint and rust of fleets, labels, seals, weather and sensor effects, which the presets of
 real cameras share."""

@@ -233,6 +233,8 @@ class WeatherConfig:
         visibility_mm: Distance at which fog leaves 2 % of the contrast (Koschmieder). Fog is
             defined as a visibility below 1 km.
         rain_probability: Probability of rain.
+        rain_up_to_lx: Most light of the environment on level ground with which rain falls. Below
+            rain clouds it is about 10000. The default is no limit, so rain also falls in sunshine.
         rate_mm_h: Water that falls as rain.
         shutter_s: Exposure time in which a drop draws its streak.
         wind: Speed of the drops across the image, as a multiple of their falling speed.
@@ -243,6 +245,7 @@ class WeatherConfig:
     fog_probability: Share = 0.0
     visibility_mm: Annotated[Range, Bounds(1000, 1e8, "mm")] = Range(2.5e4, 3e5)
     rain_probability: Share = 0.0
+    rain_up_to_lx: Annotated[float, Bounds(0.0, 2e5, "lx")] = 2e5
     rate_mm_h: Annotated[Range, Bounds(0.1, 300, "mm/h")] = Range(2, 50)
     shutter_s: Annotated[Range, Bounds(1e-5, 0.1, "s")] = Range(0.0005, 0.004)
     wind: Annotated[Range, Bounds(-3.0, 3.0)] = Range(-0.5, 0.5)

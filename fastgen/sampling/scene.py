@@ -83,8 +83,10 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
 
     kind = weighted_choice(streams("kind"), config.container.kinds)
     spreader = _spreader(config.spreader, streams)
-    weather = sample_weather(config.weather, lambda part: streams(f"weather.{part}"))
     environment = _environment(config, streams, environments)
+    weather = sample_weather(
+        config.weather, environment.illuminance_lx, lambda part: streams(f"weather.{part}")
+    )
     moment = sample_moment(config.sensor.stamp.years, hours_of(environment.name), streams("moment"))
     cameras = [_camera(name, rig, kind, streams) for name, rig in config.cameras.items()]
     around = sample_surroundings(config, kind, spreader.present, cameras, streams)

@@ -101,11 +101,12 @@ def sample_moment(
     return day + timedelta(days=int(rng.integers(364)), seconds=seconds)
 
 
-def sample_weather(config: WeatherConfig, streams: Streams) -> Weather:
+def sample_weather(config: WeatherConfig, illuminance_lx: float, streams: Streams) -> Weather:
     """Sample the weather of a scene.
 
     Args:
         config: Probabilities and ranges.
+        illuminance_lx: Light of the environment on level ground.
         streams: Function from the name of a part to its independent random generator.
 
     Returns:
@@ -118,6 +119,7 @@ def sample_weather(config: WeatherConfig, streams: Streams) -> Weather:
         rng.random() < probability
         for rng, probability in ((fog, config.fog_probability), (rain, config.rain_probability))
     )
+    rains = rains and illuminance_lx <= config.rain_up_to_lx
     wets = wet.random() < config.wet_probability or rains
     return Weather(
         visibility_mm=round(config.visibility_mm.draw(fog)) if foggy else 0.0,
