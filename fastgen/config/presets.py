@@ -112,7 +112,11 @@ _HOURS = {
 tenth are at dusk, and the rest at night. This is a choice; `fastgen fit` finds the weights of a
 camera."""
 
-_GATES = {"port_gate": 14.0, "port_gate_rain": 9.0, "port_gate_golden": 4.0}
+_GATES = {
+    **{"port_gate": 14.0, "port_gate_rain": 13.0, "port_gate_golden": 4.0},
+    # in these, a ship is so close that its hull is seen below the horizon
+    **{"port_overcast": 1.0, "port_noon": 1.0, "port_night": 1.0, "port_dusk": 0.5},
+}
 _YARDS = {
     "port_aisle": 9.0,
     "port_aisle_fog": 5.0,
