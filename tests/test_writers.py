@@ -1,5 +1,6 @@
 """Encoders and label formats, read back with third-party readers."""
 
+import io
 import json
 
 import cv2
@@ -83,6 +84,14 @@ def test_masks_survive_png_in_their_depth(tmp_path, values, size):
     assert read.dtype == mask.dtype
     np.testing.assert_array_equal(read, mask)
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "mask.png")), mask)
+
+
+@pytest.mark.parametrize("shape", [(33, 21, 3), (1, 1, 3), (300, 2, 4)])
+def test_pictures_survive_png_with_their_alpha(shape):
+    picture = np.random.default_rng(1).integers(0, 255, shape, np.uint8, endpoint=True)
+    for each in (picture, picture[::-1], np.asfortranarray(picture)):
+        read = np.asarray(Image.open(io.BytesIO(encode.png(each))))
+        np.testing.assert_array_equal(read, each)
 
 
 def test_images_keep_their_colour_order():

@@ -9,7 +9,6 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
@@ -20,14 +19,11 @@ from fastgen.files.atomic_file import whole_file
 
 JPEG_QUALITY = 92
 
-_PNG_FAST = [
-    *(cv2.IMWRITE_PNG_COMPRESSION, 1),  # first, because it resets the strategy
-    *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
-    *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP),
-]
-
 _FILTER_UP = 2
-_GREY, _INDEXED = 0, 3
+_COLOR_TYPES = {1: 0, 3: 2, 4: 6}
+"""Colour type by number of channels: grey, RGB, RGBA."""
+
+_INDEXED = 3
 
 _PICTURE_OPTIONS: dict[str, dict[str, Any]] = {
     ".png": {"compress_level": 1},
@@ -55,29 +51,17 @@ def png(
 ) -> bytes:
     """Return an image as PNG.
 
+    The difference of each row to the row above is encoded with run lengths, which suits flat areas.
+    W3C, Portable Network Graphics, second edition, sections 5 (chunks), 9 (filters) and 11.
+
     Args:
         pixels: sRGB uint8 [H, W, 3], the same with alpha [H, W, 4], or a mask uint8 or uint16
             [H, W].
         palette: Colours uint8 [N, 3] of the values of a mask of 8 bits, as which viewers show it.
     """
-    if pixels.ndim == 2:
-        return _mask_png(pixels, palette)
-    channels = [2, 1, 0, 3][: pixels.shape[2]]
-    done, data = cv2.imencode(".png", np.ascontiguousarray(pixels[..., channels]), _PNG_FAST)
-    assert done
-    return data.tobytes()
-
-
-def _mask_png(
-    pixels: NDArray[np.uint8] | NDArray[np.uint16], palette: NDArray[np.uint8] | None
-) -> bytes:
-    """Encode each row's difference to the row above with run lengths, which suits flat areas.
-
-    W3C, Portable Network Graphics, second edition, sections 5 (chunks), 9 (filters) and 11.
-    """
-    height, width = pixels.shape
-    depth = 8 * pixels.itemsize
+    height, width, channels = np.atleast_3d(pixels).shape
     values = np.ascontiguousarray(pixels, pixels.dtype.newbyteorder(">")).view(np.uint8)
+    values = values.reshape(height, -1)
     rows = np.empty((height, 1 + values.shape[1]), np.uint8)
     rows[:, 0] = _FILTER_UP
     rows[0, 1:] = values[0]
@@ -85,8 +69,8 @@ def _mask_png(
     # zlib gives the same bytes but takes ten times as long
     packer = zlib_ng.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS, 8, zlib.Z_RLE)
     packed = packer.compress(rows) + packer.flush()
-    kind = _GREY if palette is None else _INDEXED
-    head = struct.pack(">IIBBBBB", width, height, depth, kind, 0, 0, 0)
+    kind = _COLOR_TYPES[channels] if palette is None else _INDEXED
+    head = struct.pack(">IIBBBBB", width, height, 8 * pixels.itemsize, kind, 0, 0, 0)
     chunks = [_chunk(b"IHDR", head), _chunk(b"IDAT", packed), _chunk(b"IEND", b"")]
     if palette is not None:
         chunks.insert(1, _chunk(b"PLTE", palette.tobytes()))
