@@ -273,7 +273,7 @@ def _ground_part(ground: Ground, atlas: Atlas) -> trimesh.Trimesh:
     away = np.abs(np.arange(columns) + 0.5 - ground.reach_mm / atlas.texel_mm)
     away = np.hypot(away, away[:rows, None]) * (atlas.texel_mm / ground.reach_mm)
     x = np.clip((away - GROUND_FADE_START) / (1 - GROUND_FADE_START), 0, 1)
-    alpha = 255 * (1 - x * x * (3 - 2 * x))  # smoothstep, as ground_seen.glsl does
+    alpha = 255 * (1 - x * x * (3 - 2 * x))  # smoothstep, as seen_plane.glsl does
     color = np.dstack([atlas.base_color, np.rint(alpha)[::-1].astype(np.uint8)])
     square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * ground.reach_mm
     uv = atlas.uv(square[:, :2] + ground.reach_mm)

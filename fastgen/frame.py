@@ -12,15 +12,17 @@ class Frame:
 
     Attributes:
         image: uint8 [H, W, 3], sRGB.
-        cover: uint8 [H, W], coverage of the pixel by container and spreader; 255 is full coverage.
-            The surroundings fill the rest.
-        ids: uint16 [H, W], object id at the pixel centre, 0 for the surroundings.
-        damage: uint16 [H, W], damage class * 100 + instance.
-        depth: float32 [H, W], metres along the optical axis, inf for the surroundings.
+        cover: uint8 [H, W], share of the pixel that does not show the panorama: containers,
+            spreader, ground and props; 255 is all of it.
+        ids: uint16 [H, W], object id at the pixel centre, 0 for ground, props and panorama.
+        damage: uint16 [H, W], category * 100 + instance at the pixel centre, see
+            classes.ALL_SEGMENTATION_CLASSES. The first undamaged container has 101; 0 elsewhere.
+        depth: float32 [H, W], metres along the optical axis, inf where the pixel centre shows the
+            panorama.
         radiance: float32 [H, W, 3], linear Rec. 709 after exposure and before the tone curve;
             None unless requested.
         normals: float32 [H, W, 3], unit normals in view space (x right, y down, z forward), mean
-            over the surfaces in a pixel, 0 for the surroundings; None unless requested.
+            over the surfaces in a pixel, 0 for the panorama; None unless requested.
     """
 
     image: NDArray[np.uint8]

@@ -54,8 +54,8 @@ ivec2 in_turn(ivec2 size) {
     return ivec2(number - row * size.x, row);
 }
 
-void write_labels(ivec2 pixel, uint key, float depth) {
-    uint labels = zone_id(id_zone(key));
+void write_labels(ivec2 pixel, uint surface_id, float depth) {
+    uint labels = zone_id(id_zone(surface_id));
     if (labels != SPREADER_ID) labels |= uint(undamaged_value) << 16;
     imageStore(label_image, pixel, uvec4(labels));
     imageStore(depth_image, pixel, vec4(depth));
@@ -91,35 +91,36 @@ void list_block(ivec2 block, uint plain, uint decals, uint mixed, uint mixed_dec
 }
 
 #if SAMPLES_PER_AXIS > 1
-// List of a pixel, or NO_LIST, from the samples near its centre, which is in `key`.
-uint list_of(ivec2 middle, out uint key) {
-    uint keys[FILTER_NEAR] = near_surface_ids(middle);
-    key = keys[0];
+// List of a pixel, or NO_LIST, from the samples near its centre. center_id: Surface id of the centre.
+uint list_of(ivec2 middle, out uint center_id) {
+    uint sample_ids[FILTER_NEAR] = near_surface_ids(middle);
+    center_id = sample_ids[0];
     bool mixed = false;
     // Test three zones for decals: that of the centre, and the first and the last other one. Few
     // pixels see a fourth.
-    uint first = key, last = key;
+    uint first = center_id, last = center_id;
     ivec2 first_at = middle, last_at = middle;
     for (int i = 1; i < FILTER_NEAR; ++i) {
-        mixed = mixed || keys[i] != key;
-        if (id_zone(keys[i]) == id_zone(key)) continue;
-        last = keys[i];
+        mixed = mixed || sample_ids[i] != center_id;
+        if (id_zone(sample_ids[i]) == id_zone(center_id)) continue;
+        last = sample_ids[i];
         last_at = middle + FILTER_OFFSET[i];
-        if (first == key) { first = last; first_at = last_at; }
+        if (first == center_id) { first = last; first_at = last_at; }
     }
-    uint part = key;
-    ivec2 part_at = middle;
+    uint tested_id = center_id;
+    ivec2 tested_at = middle;
     bool decal = false;
-    int parts = first == key ? 1 : first_at == last_at ? 2 : 3, tested = 0;
+    int zones = first == center_id ? 1 : first_at == last_at ? 2 : 3, tested = 0;
     do {
-        decal = decal || (part != 0u && near_decals(id_zone(part), texelFetch(atlas_positions, part_at, 0).xy));
-        part = tested == 0 ? first : last;
-        part_at = tested == 0 ? first_at : last_at;
-    } while (++tested < parts);
-    uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
+        vec2 atlas_mm = texelFetch(atlas_positions, tested_at, 0).xy;
+        decal = decal || (tested_id != 0u && near_decals(id_zone(tested_id), atlas_mm));
+        tested_id = tested == 0 ? first : last;
+        tested_at = tested == 0 ? first_at : last_at;
+    } while (++tested < zones);
+    uint list = center_id == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
     if (mixed) list = decal ? LIST_MIXED_DECAL : LIST_MIXED;
 #if DAMAGED
-    int near = key != 0u ? damage_near(rest_at(middle), middle) : 0;
+    int near = center_id != 0u ? damage_near(rest_at(middle), middle) : 0;
     if (near > 0) list = mixed ? LIST_MIXED_DAMAGED : LIST_DAMAGED;
     if (near > 1) list = LIST_HOLED;
 #endif
@@ -139,8 +140,8 @@ void main() {
         ivec2 pixel = block + in_block(i);
         if (any(greaterThanEqual(pixel - region.xy, region.zw))) continue;
         ivec2 middle = center_texel(pixel);
-        uint key, list = list_of(middle, key), bit = 1u << i;
-        if (key != 0u) write_labels(pixel, key, texelFetch(surface_depths, middle, 0).r);
+        uint center_id, list = list_of(middle, center_id), bit = 1u << i;
+        if (center_id != 0u) write_labels(pixel, center_id, texelFetch(surface_depths, middle, 0).r);
         plain |= list == LIST_PLAIN ? bit : 0u;
         decals |= list == LIST_DECAL ? bit : 0u;
         mixed |= list == LIST_MIXED ? bit : 0u;
@@ -161,7 +162,7 @@ void main() {
     ivec2 block = region.xy + in_region;
     vec2 middle = vec2(block + 1) / vec2(textureSize(surface_ids, 0));
     // The swizzle .wzxy reorders the texels of textureGather as in_block counts them.
-    uvec4 key = textureGather(surface_ids, middle).wzxy;
+    uvec4 surface_id = textureGather(surface_ids, middle).wzxy;
     vec4 atlas_x = textureGather(atlas_positions, middle, 0).wzxy;
     vec4 atlas_y = textureGather(atlas_positions, middle, 1).wzxy;
     vec4 depth = textureGather(surface_depths, middle).wzxy;
@@ -172,8 +173,8 @@ void main() {
     uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // One bit per pixel and class.
     for (int i = 0; i < 4; ++i) {
         ivec2 pixel = block + in_block(i);
-        if (any(greaterThanEqual(pixel - region.xy, region.zw)) || key[i] == 0u) continue;
-        write_labels(pixel, key[i], depth[i]);
+        if (any(greaterThanEqual(pixel - region.xy, region.zw)) || surface_id[i] == 0u) continue;
+        write_labels(pixel, surface_id[i], depth[i]);
         uint bit = 1u << i;
 #if DAMAGED
         int near = damage_near(vec3(rest_mm[0][i], rest_mm[1][i], rest_mm[2][i]), center_texel(pixel));
@@ -181,7 +182,7 @@ void main() {
         if (near == 1) damaged |= bit;
         if (near > 0) continue;
 #endif
-        if (near_decals(id_zone(key[i]), vec2(atlas_x[i], atlas_y[i]))) decals |= bit;
+        if (near_decals(id_zone(surface_id[i]), vec2(atlas_x[i], atlas_y[i]))) decals |= bit;
         else plain |= bit;
     }
     list_block(block, plain, decals, 0u, 0u, damaged, 0u, holed);

@@ -3,7 +3,7 @@
 
 #include "decals.constants"
 #include "scene.block"
-#include "print_area.glsl"
+#include "footprint.glsl"
 #include "text_coverage.glsl"
 #include "tone_curve.glsl"
 #include "worn_art.glsl"

@@ -10,6 +10,6 @@ vec3 environment_reflection(BrdfTerms r, SkyVisibility sky) {
     Material m = r.material;
     vec3 metal = (m.albedo * r.dfg.x + r.dfg.y) * (1.0 + m.albedo * r.gain);
     vec3 specular = mix(vec3(r.dielectric), metal, m.metallic);
-    vec3 around = environment_irradiance(sky, r.normal);
-    return r.diffuse * around + specular * environment_mirror(r, sky, around);
+    vec3 irradiance = environment_irradiance(sky, r.normal);
+    return r.diffuse * irradiance + specular * environment_mirror(r, sky, irradiance);
 }

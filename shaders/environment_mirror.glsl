@@ -1,6 +1,6 @@
-// vec3 environment_mirror(BrdfTerms r, SkyVisibility sky, vec3 around): mean radiance that the specular
+// vec3 environment_mirror(BrdfTerms r, SkyVisibility sky, vec3 irradiance): mean radiance that the specular
 // lobe of a surface receives from the sky and from the occluders.
-// around: Irradiance / pi on the surface. Bend, width and lean of the lobe are fitted as in
+// irradiance: Irradiance / pi on the surface. Bend, width and lean of the lobe are fitted as in
 // lobe_visibility.glsl.
 
 #include "scene.block"
@@ -12,12 +12,12 @@
 // Mean radiance of the ground that is seen from the side of the container with this normal.
 vec3 ground_radiance(vec3 normal) {
     vec3 share = normal * normal;
-    return share.x * ground_seen[normal.x > 0.0 ? 1 : 0].rgb +
-           share.y * ground_seen[normal.y > 0.0 ? 3 : 2].rgb +
-           share.z * ground_seen[normal.z > 0.0 ? 5 : 4].rgb;
+    return share.x * side_ground_radiance[normal.x > 0.0 ? 1 : 0].rgb +
+           share.y * side_ground_radiance[normal.y > 0.0 ? 3 : 2].rgb +
+           share.z * side_ground_radiance[normal.z > 0.0 ? 5 : 4].rgb;
 }
 
-vec3 environment_mirror(BrdfTerms r, SkyVisibility sky, vec3 around) {
+vec3 environment_mirror(BrdfTerms r, SkyVisibility sky, vec3 irradiance) {
     float roughness = r.material.roughness;
     // Rough lobes bend toward the normal (Lagarde and de Rousiers 2014, Moving Frostbite to PBR,
     // section 4.9.3) and are narrower at grazing angles.
@@ -36,8 +36,8 @@ vec3 environment_mirror(BrdfTerms r, SkyVisibility sky, vec3 around) {
     float spread = fma(1.95 * width, width, 0.02);
     float below = 0.5 - 0.5 * mirror.z * inversesqrt(fma(mirror.z, mirror.z, spread * spread));
     float raised = 0.5 * (direction.z + length(vec2(direction.z, 1.3 * spread)));
-    direction.z = mix(direction.z, raised, ground_seen[0].w);
-    below *= ground_seen[0].w;
+    direction.z = mix(direction.z, raised, side_ground_radiance[0].w);
+    below *= side_ground_radiance[0].w;
     vec3 seen = mix(prefiltered(direction, width), ground_radiance(r.normal), below);
-    return mix(sky.occluder_albedo * around, seen, open);
+    return mix(sky.occluder_albedo * irradiance, seen, open);
 }

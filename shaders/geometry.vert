@@ -60,7 +60,7 @@ void main() {
     position_mm = deformed(in_position_mm);
 #endif
     sky_visibility = vec4(in_sky_cone, mirror_visibility(position_mm * MM, in_normal));
-    gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));
+    gl_Position = lens_distorted(world_to_clip * vec4(position_mm * MM, 1.0));
 #if HOLED
     // Viewport 1 holds the inner view, which holes reveal. It is mirrored: that swaps front and back
     // faces, so face culling keeps the inner sides.

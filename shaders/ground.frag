@@ -14,7 +14,7 @@
 #include "ground_material.glsl"
 #include "ground_mirror.glsl"
 #include "ground_props.glsl"
-#include "ground_seen.glsl"
+#include "seen_plane.glsl"
 #include "view_ray.glsl"
 
 layout(location = 0) out vec4 out_color;
@@ -29,7 +29,7 @@ const float PIXEL_WIDTH = 1.0 + GROUND_COARSE;
 vec3 ground_color(vec3 at, vec3 ray, float depth) {
     float stretch = dot(ray, ray) / (ray.z * ray.z);
     float least = depth * pixel_angle * PIXEL_WIDTH;
-    float blur_m = 0.35 * least * sqrt(sqrt(stretch));
+    float blur_m = GROUND_FILTER_PX * least * sqrt(sqrt(stretch));
     vec2 along = ray.xy * inversesqrt(max(dot(ray.xy, ray.xy), 1e-12));
     float longest = 1e3 * least * sqrt(stretch);
     // Sharper than the longer axis; the shorter one alone would flicker.

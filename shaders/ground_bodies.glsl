@@ -79,13 +79,13 @@ float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m) {
 }
 
 #if GROUND_PROPS
-// A cylinder's axis is its y axis. body_paint.w is above 1 for cylinders.
+// A cylinder's axis is its y axis. body_paint.w is CYLINDER for cylinders.
 BodyHit body_hit(vec3 from, vec3 ray, int i) {
     vec3 o = in_body(from - body_center[i].xyz, i), d = in_body(ray, i), size = body_half[i].xyz;
     vec3 inverse = reciprocal(d);
     vec3 middle = -o * inverse, width = size * abs(inverse);
     vec3 enter = middle - width, leave = middle + width;
-    bool round_side = body_paint[i].w > 1.0;
+    bool round_side = body_paint[i].w == CYLINDER;
     if (round_side) {
         // The distance from the axis, times the length across it, needs no cancelling terms.
         float length2 = max(dot(d.xz, d.xz), 1e-12), aside = o.x * d.z - o.z * d.x;

@@ -37,7 +37,7 @@ void prop_shade(vec3 at, float blur_m, inout float open, inout float hidden) {
         int i = next_prop(left);
         vec3 offset = in_body(at - body_center[i].xyz, i), size = body_half[i].xyz;
         vec3 apart = max(abs(offset) - size, 0.0), enter;
-        float near = clamp(1.0 - length(apart) / min(2.0 * size.z, 0.6), 0.0, 1.0);
+        float near = clamp(1.0 - length(apart) / min(2.0 * size.z, PROP_SHADE_M), 0.0, 1.0);
         open *= 1.0 - 0.6 * near * near;
         hidden += hidden_share(offset, size, body_light[i].xyz, light_direction[0].w, blur_m, enter);
     }

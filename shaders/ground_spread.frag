@@ -3,7 +3,7 @@
 // panorama, no labels, and the depth of each pixel.
 #version 430 core
 #include "display_color.glsl"
-#include "ground_seen.glsl"
+#include "seen_plane.glsl"
 #include "view_ray.glsl"
 
 uniform sampler2D ground_coarse;   // Exposed radiance, share that is not the panorama.

@@ -13,7 +13,7 @@ vec3 interior_albedo(vec3 normal, vec3 rest_mm) {
 }
 
 vec3 interior(vec3 normal, vec3 rest_mm) {
-    vec3 around = 0.5 * (diffuse_radiance(vec3(0.0, 0.0, 1.0)) + diffuse_radiance(vec3(0.0, 0.0, -1.0)));
+    vec3 irradiance = 0.5 * (diffuse_radiance(vec3(0.0, 0.0, 1.0)) + diffuse_radiance(vec3(0.0, 0.0, -1.0)));
     float fall = 0.6 + 0.4 * abs(normal.z) + 0.15 * normal.x;
-    return INSIDE_LIGHT * around * interior_albedo(normal, rest_mm) * fall;
+    return INSIDE_LIGHT * irradiance * interior_albedo(normal, rest_mm) * fall;
 }

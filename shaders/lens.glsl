@@ -1,6 +1,6 @@
 // Twin of fastgen/camera/lens.py.
-// vec4 bent(vec4 clip): clip position after the lens distortion.
-// vec2 undistorted(vec2 pixel): undistorted position of a pixel of the image; the inverse of bent().
+// vec4 lens_distorted(vec4 clip): clip position after the lens distortion.
+// vec2 undistorted(vec2 pixel): undistorted position of a pixel of the image; the inverse of it.
 // Brown-Conrady and fisheye (Kannala-Brandt) models with OpenCV's coefficients. Far outside the image
 // the radial polynomial continues as a straight line.
 
@@ -14,7 +14,7 @@ vec2 tangential(vec2 p) {
     return twice + lens_tangential.yx * (q + 2.0 * p * p);
 }
 
-vec4 bent(vec4 clip) {
+vec4 lens_distorted(vec4 clip) {
     if (lens_model == 0.0) return clip;
     mat2 to_clip = mat2(lens_to_clip.xy, lens_to_clip.zw);
     vec2 ideal = inverse(to_clip) * (clip.xy - lens_clip_center * clip.w) / clip.w;

@@ -34,7 +34,7 @@ const float SCRAPE_STAIN = 4.0;
 struct SurfacePoint {
     Material material;
     vec3 outward;   // Outward axis of a panel's face, or 0; see zone.glsl.
-    float printed;   // Share of the footprint that shows a decal.
+    float decal_share;   // Share of the footprint that shows a decal.
 };
 
 vec2 noise_position(vec2 atlas_mm, int code) { return upright(atlas_mm, code) + noise_offset_mm; }
@@ -133,7 +133,7 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar,
     albedo = mix(albedo, ochre, rusty);
     roughness = mix(roughness, rust_roughness, rusty);
 #endif
-    s.printed = decal_alpha * (1.0 - rusty);
+    s.decal_share = decal_alpha * (1.0 - rusty);
     float metallic = trait.x * (1.0 - rusty);
     apply_wetness(albedo, roughness, metallic, wetness * (0.6 + 0.4 * coarse.value.x));
     s.material = Material(clamp(albedo, 0.0, 0.95), max(roughness, MIN_ROUGHNESS), metallic);

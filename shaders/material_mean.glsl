@@ -9,7 +9,7 @@
 // Keeps the values of the first lookup that are the same for all.
 SurfacePoint empty_material_sum(SurfacePoint first) {
     first.material = Material(vec3(0.0), 0.0, 0.0);
-    first.printed = 0.0;
+    first.decal_share = 0.0;
     return first;
 }
 
@@ -22,5 +22,5 @@ void add_material(inout SurfacePoint sum, ZoneSample p, uint zone, vec2 atlas_mm
     sum.material.albedo += s.material.albedo / count;
     sum.material.roughness += s.material.roughness / count;
     sum.material.metallic += s.material.metallic / count;
-    sum.printed += s.printed / count;
+    sum.decal_share += s.decal_share / count;
 }

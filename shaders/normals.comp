@@ -24,9 +24,9 @@ uniform ivec4 region;   // Corner x, y, width and height in pixels.
 // The interior that a hole reveals, seen from behind; 0 where it reveals the sky through another hole.
 vec3 interior_normal(ivec2 sample_at) {
     ivec2 inner_at = ivec2(textureSize(surface_ids, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
-    uint key = surface_id_at(inner_at);
-    if (key == 0u) return vec3(0.0);
-    return deformed_normal(damage_at(rest_at(inner_at)).bend, -id_normal(key));
+    uint surface_id = surface_id_at(inner_at);
+    if (surface_id == 0u) return vec3(0.0);
+    return deformed_normal(damage_at(rest_at(inner_at)).bend, -id_normal(surface_id));
 }
 #endif
 
@@ -43,15 +43,15 @@ void main() {
 #endif
     for (int i = 0; i < FILTER_SAMPLES; ++i) {
         ivec2 sample_at = middle + FILTER_OFFSET[i];
-        uint key = surface_id_at(sample_at);
-        if (key == 0u) continue;
-        vec3 normal = id_normal(key);
+        uint surface_id = surface_id_at(sample_at);
+        if (surface_id == 0u) continue;
+        vec3 normal = id_normal(surface_id);
 #if WITH_DAMAGE
         vec3 rest_mm = rest_at(sample_at);
         normal = deformed_normal(damage_at(rest_mm).bend, normal);
 #endif
 #if WITH_HOLES
-        if (hole_at(rest_mm) >= 0 && !is_door_gear(id_zone(key))) {
+        if (hole_at(rest_mm) >= 0 && !is_door_gear(id_zone(surface_id))) {
             if (!torn) interior = interior_normal(sample_at);
             torn = true;
             normal = interior;

@@ -26,11 +26,11 @@ void main() {
     if (other) cell.y -= point_rows;
     ivec2 pixel = cell * point_step + point_step / 2;
     ivec2 sample_at = center_texel(pixel);
-    uint key = surface_id_at(sample_at);
+    uint surface_id = surface_id_at(sample_at);
     if (other) {
-        uint first = key;
+        uint first = surface_id;
         bool last = ((cell.x + cell.y) & 1) == 1;
-        key = 0u;
+        surface_id = 0u;
         // Neighbours are at most one pixel away and inside the image. Outside it the visibility buffer
         // holds earlier content.
         ivec2 before = -ivec2(min(point_step / 2, 1));
@@ -38,25 +38,25 @@ void main() {
         for (int y = before.y; y <= after.y; ++y) {
             for (int x = before.x; x <= after.x; ++x) {
                 ivec2 middle = center_texel(pixel + ivec2(x, y));
-                uint keys[FILTER_NEAR] = near_surface_ids(middle);
+                uint sample_ids[FILTER_NEAR] = near_surface_ids(middle);
                 for (int i = 0; i < FILTER_NEAR; ++i) {
-                    if (keys[i] == 0u || keys[i] == first || (key != 0u && !last)) continue;
-                    key = keys[i];
+                    if (sample_ids[i] == 0u || sample_ids[i] == first || (surface_id != 0u && !last)) continue;
+                    surface_id = sample_ids[i];
                     sample_at = middle + FILTER_OFFSET[i];
                 }
             }
         }
     }
     vec3 ray = view_ray(sample_position(sample_at));
-    ZoneSample p = zone_sample(sample_at, key, -normalize(ray));
-    vec3 normal = id_normal(key);
+    ZoneSample p = zone_sample(sample_at, surface_id, -normalize(ray));
+    vec3 normal = id_normal(surface_id);
 #if WITH_DAMAGE
     normal = deformed_normal(p.bend, normal);
 #endif
 #if HOLED
-    if (hole_at(rest_at(sample_at)) >= 0 && !is_door_gear(id_zone(key))) key = 0u;
+    if (hole_at(rest_at(sample_at)) >= 0 && !is_door_gear(id_zone(surface_id))) surface_id = 0u;
 #endif
-    out_surface_id = key;
+    out_surface_id = surface_id;
     out_position = vec4(p.depth * ray, p.surface.material.roughness);
     out_normal = vec4(normal, 0.0);
 }

@@ -1,7 +1,7 @@
 // Shaded shade_behind(ivec2 pixel, vec3 ray): what lies behind the container at a pixel: the sky, or with
 // OVER the image as it is, with the coverage by the bodies that it shows.
-// vec3 before(vec3 color, Shaded behind, float share): display colour of exposed radiance in front of it;
-// `share` of the pixel shows what lies behind.
+// vec3 blend_over(vec3 color, Shaded behind, float share): display colour of a pixel of which `share` shows
+// what lies behind, and the rest exposed radiance `color`.
 
 #include "variant.constants"
 #include "display_color.glsl"
@@ -22,7 +22,7 @@ Shaded shade_behind(ivec2 pixel, vec3 ray) {
     return s;
 }
 
-vec3 before(vec3 color, Shaded behind, float share) {
+vec3 blend_over(vec3 color, Shaded behind, float share) {
 #if OVER && !RADIANCE
     // The image is tone-mapped already, so the two are mixed as light of the display.
     vec3 light = srgb_decode(display_color(color));

@@ -11,10 +11,10 @@
 
 Shaded shade_single_surface(ivec2 pixel) {
     ivec2 middle = center_texel(pixel);
-    uint key = surface_id_at(middle);
+    uint surface_id = surface_id_at(middle);
     vec3 ray = view_ray(vec2(pixel) + 0.5);
     vec3 view = -normalize(ray);
-    ZoneSample p = zone_sample(middle, key, view);
+    ZoneSample p = zone_sample(middle, surface_id, view);
 #if LOOKUPS > 1
     // The surface is nearly flat between the centre sample and two other near samples, so the atlas
     // position is linear in the pixel.
@@ -26,8 +26,8 @@ Shaded shade_single_surface(ivec2 pixel) {
     mat2 mm_of_pixel = moved_mm * inverse(pixels);
     SurfacePoint mean = empty_material_sum(p.surface);
     for (int i = 0; i < LOOKUPS; ++i)
-        add_material(mean, p, id_zone(key), atlas_mm + mm_of_pixel * LOOKUP_PLACE[i], float(LOOKUPS));
+        add_material(mean, p, id_zone(surface_id), atlas_mm + mm_of_pixel * LOOKUP_PLACE[i], float(LOOKUPS));
     p.surface = mean;
 #endif
-    return Shaded(zone_color(p, middle, key, ray, view), p.id, p.damage, p.depth, 1.0);
+    return Shaded(zone_color(p, middle, surface_id, ray, view), p.id, p.damage, p.depth, 1.0);
 }

@@ -5,7 +5,7 @@
 #include "zones.constants"
 #include "scene.block"
 #include "view.block"
-#include "print_area.glsl"
+#include "footprint.glsl"
 #include "zone.glsl"
 
 // Widths of a pixel between which the plane of the face replaces the local normal. A wide pixel covers

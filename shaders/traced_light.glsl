@@ -1,6 +1,6 @@
-// TracedLight traced_light_at(vec2 place, uint key, vec3 from_eye, vec3 normal): light that rays found at
-// the points of ray_points.frag near `place`, a position in the image in pixels.
-// key: Surface id. from_eye: Vector from the eye to the surface in m.
+// TracedLight traced_light_at(vec2 place, uint surface_id, vec3 from_eye, vec3 normal): light that rays
+// found at the points of ray_points.frag near `place`, a position in the image in pixels.
+// from_eye: Vector from the eye to the surface in m.
 
 #include "variant.constants"
 #include "view.block"
@@ -11,7 +11,7 @@ uniform sampler2D ray_point_positions;
 uniform sampler2DArray ray_point_light;   // Layers in the order of traced_light.py.
 
 // Weighted mean over points on the same surface. weight: Sum of the weights, 0 for no point.
-TracedLight traced_light_at(vec2 place, uint key, vec3 from_eye, vec3 normal) {
+TracedLight traced_light_at(vec2 place, uint surface_id, vec3 from_eye, vec3 normal) {
     vec2 at = (place - 0.5 - float(point_step / 2)) / float(point_step);   // In cells.
     ivec2 nearest = ivec2(round(at));
     ivec2 cells = textureSize(ray_point_ids, 0) / ivec2(1, 2);
@@ -28,7 +28,7 @@ TracedLight traced_light_at(vec2 place, uint key, vec3 from_eye, vec3 normal) {
         // Points within 5 mm of the plane are on the same surface: corrugation is at least 20 mm deep.
         // Damaged sheets are curved, so distant points may lie farther off.
         float off = WITH_DAMAGE == 1 ? fma(0.15, length(apart), 0.005) : 0.005;
-        bool same = texelFetch(ray_point_ids, cell, 0).r == key && abs(dot(apart, normal)) < off;
+        bool same = texelFetch(ray_point_ids, cell, 0).r == surface_id && abs(dot(apart, normal)) < off;
         if (!same) continue;
         float weight = near.x * near.y;
         mean.sky_share += weight * texelFetch(ray_point_light, ivec3(cell, 0), 0).rgb;

@@ -25,23 +25,23 @@ uint[FILTER_NEAR] near_surface_ids(ivec2 middle) {
         low.w, low.z, surface_id_at(middle + ivec2(1, -1)),
         low.x, low.y, high.z,
         surface_id_at(middle + ivec2(-1, 1)), high.x, high.y);
-    uint keys[FILTER_NEAR];
+    uint sample_ids[FILTER_NEAR];
     for (int i = 0; i < FILTER_NEAR; ++i)
-        keys[i] = beside[3 * (FILTER_OFFSET[i].y + 1) + FILTER_OFFSET[i].x + 1];
-    return keys;
+        sample_ids[i] = beside[3 * (FILTER_OFFSET[i].y + 1) + FILTER_OFFSET[i].x + 1];
+    return sample_ids;
 }
 #else
 uint[FILTER_NEAR] near_surface_ids(ivec2 middle) {
-    uint keys[FILTER_NEAR];
-    for (int i = 0; i < FILTER_NEAR; ++i) keys[i] = surface_id_at(middle + FILTER_OFFSET[i]);
-    return keys;
+    uint sample_ids[FILTER_NEAR];
+    for (int i = 0; i < FILTER_NEAR; ++i) sample_ids[i] = surface_id_at(middle + FILTER_OFFSET[i]);
+    return sample_ids;
 }
 #endif
 
 uint[FILTER_SAMPLES] filter_surface_ids(ivec2 middle) {
     uint near[FILTER_NEAR] = near_surface_ids(middle);
-    uint keys[FILTER_SAMPLES];
-    for (int i = 0; i < FILTER_NEAR; ++i) keys[i] = near[i];
-    for (int i = FILTER_NEAR; i < FILTER_SAMPLES; ++i) keys[i] = surface_id_at(middle + FILTER_OFFSET[i]);
-    return keys;
+    uint sample_ids[FILTER_SAMPLES];
+    for (int i = 0; i < FILTER_NEAR; ++i) sample_ids[i] = near[i];
+    for (int i = FILTER_NEAR; i < FILTER_SAMPLES; ++i) sample_ids[i] = surface_id_at(middle + FILTER_OFFSET[i]);
+    return sample_ids;
 }

@@ -1,6 +1,5 @@
-// ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view): material, ids, damage and depth, which
-// are evaluated once per zone in a pixel, at one of its samples. key: Surface id of the sample. view:
-// Unit, toward the eye.
+// ZoneSample zone_sample(ivec2 sample_at, uint surface_id, vec3 view): material, ids, damage and depth,
+// which are evaluated once per zone in a pixel, at one of its samples. view: Unit, toward the eye.
 
 #include "labels.constants"
 #include "lookups.constants"
@@ -31,9 +30,9 @@ struct ZoneSample {
 #endif
 };
 
-ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
+ZoneSample zone_sample(ivec2 sample_at, uint surface_id, vec3 view) {
     vec2 atlas_mm = texelFetch(atlas_positions, sample_at, 0).xy;
-    vec3 normal = id_normal(key);
+    vec3 normal = id_normal(surface_id);
     ZoneSample p;
     p.damage = uint(undamaged_value);
     p.depth = texelFetch(surface_depths, sample_at, 0).r;
@@ -51,11 +50,11 @@ ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
     p.footprint_mm = LOOKUP_PX * p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
     p.decal = NO_DECAL;
 #if WITH_DECALS
-    p.decal_pixel = sheet_footprint(id_zone(key), normal, view, p.depth);
-    p.decal = worn_decals(id_zone(key), atlas_mm, p.decal_pixel);
+    p.decal_pixel = sheet_footprint(id_zone(surface_id), normal, view, p.depth);
+    p.decal = worn_decals(id_zone(surface_id), atlas_mm, p.decal_pixel);
 #endif
-    p.surface = surface_at(id_zone(key), atlas_mm, p.footprint_mm, p.scar, p.decal);
-    p.id = p.decal.id != 0u ? p.decal.id : zone_id(id_zone(key));
+    p.surface = surface_at(id_zone(surface_id), atlas_mm, p.footprint_mm, p.scar, p.decal);
+    p.id = p.decal.id != 0u ? p.decal.id : zone_id(id_zone(surface_id));
     if (p.id == SPREADER_ID) p.damage = 0u;
     return p;
 }

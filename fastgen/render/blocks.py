@@ -44,7 +44,7 @@ SCENE_BLOCK = Block(
         ("float", "decal_cell_mm"),
         ("float", "decal_margin_mm"),
         # radiance of the ground before the -x, +x, -y, +y, -z and +z side; 1 if there is one
-        ("vec4", "ground_seen", 6),
+        ("vec4", "side_ground_radiance", 6),
         ("vec4", "above"),  # albedo of the spreader above the container; 1 if there is one
     ),
 )
@@ -114,7 +114,7 @@ GROUND_BLOCK = Block(
         # boxes of the containers, then from MAX_BOXES the props
         ("vec4", "body_center", MAX_BOXES + MAX_PROPS),  # in m; cosine of its turn
         ("vec4", "body_half", MAX_BOXES + MAX_PROPS),  # half of its size in m; sine of its turn
-        # albedo; for boxes the height in m of the gap below it, for cylinders a number above 1
+        # albedo; for containers the height in m of the gap below, for props CYLINDER or 0
         ("vec4", "body_paint", MAX_BOXES + MAX_PROPS),
         # reciprocal of the unit vector to the first light, in the axes of each body
         ("vec4", "body_light", MAX_BOXES + MAX_PROPS),

@@ -86,6 +86,15 @@ _SKY_DEPTH = 1 - 2**-18
 """Clip-space depth of the background over w: below 1 because clipping may round, and behind
 everything nearer than 198 m."""
 
+CYLINDER = 2.0
+"""Value in body_paint of GROUND_BLOCK that marks a prop as a cylinder."""
+
+GROUND_FILTER_PX = 0.35
+"""Radius in pixels over which ground.frag filters edges of shadows on a plane seen face-on."""
+
+PROP_SHADE_M = 0.6
+"""Largest distance from a prop at which it shades the ground from the sky."""
+
 GROUND_FADE_START = 0.5
 """Share of the ground's reach at which it starts to fade into the panorama."""
 
@@ -113,6 +122,11 @@ class _Array(NamedTuple):
 
 
 def _variant(v: ShaderVariant) -> Defines:
+    """Return the switches of a shader.
+
+    WITH_* say what the pixels of a class may see (PIXEL_CLASSES). DAMAGED and HOLED say what the
+    geometry of the scene has, for stages that run before the classes.
+    """
     shown = {
         name: int(v.layer in ("all", "normals", "reflection", name) and name not in v.without)
         for name in LAYERS
@@ -175,7 +189,7 @@ def _lookups(v: ShaderVariant) -> Defines:
         "DECAL_PX": 1 / per_axis if decals_each else 1.0,
         "LOOKUP_PLACE": _Array("vec2", places),
         # surfaces beyond these numbers look like the rest of their pixel
-        "MAX_PARTS": 3,
+        "MAX_PIXEL_ZONES": 3,
         "MAX_ORIENTATIONS": 4,
     }
 
@@ -205,6 +219,7 @@ def _ground(v: ShaderVariant) -> Defines:
         "GROUND_PROPS": int(ground.props),
         "GROUND_COARSE": int(ground.coarse),
         "GROUND_FADE_START": GROUND_FADE_START,
+        "GROUND_FILTER_PX": GROUND_FILTER_PX,
         "LINE_MM": LINE_MM,
         "DAMP_SOFTNESS": DAMP_SOFTNESS,
         "DAMP_WETNESS": DAMP_WETNESS,
@@ -213,7 +228,9 @@ def _ground(v: ShaderVariant) -> Defines:
         "PROP_SUNLIT_BESIDE_M": prop_light.SUNLIT_BESIDE_M,
         "PROP_LOWEST_SHARE": prop_light.LOWEST_SHARE,
         "PROP_OPEN_M": prop_light.OPEN_M,
+        "PROP_SHADE_M": PROP_SHADE_M,
         "PROP_SHEEN": prop_light.SHEEN,
+        "CYLINDER": f"{CYLINDER:.1f}",
         "TILE_PX": TILE_PX,
     }
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import Member
 from fastgen.light.directional_lights import DirectionalLight
+from fastgen.render.constants import GROUND_FILTER_PX, PROP_SHADE_M
 from fastgen.render.ground_values import clear_radius_mm
 from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
@@ -18,12 +19,8 @@ from fastgen.scene import Ground, Prop
 from fastgen.scene.boxes import OrientedBox, prop_box
 from fastgen.scene.limits import MM
 
-_SHADED_MM = 600.0
-"""Distance from a prop within which it shades the ground, see ground_props.glsl."""
-
-_FILTER_PX = 0.7
-"""Radius in pixels over which ground.frag filters edges of shadows on a plane seen face-on: 0.35
-pixels of an image that may have half the resolution."""
+_FILTER_PX = 2 * GROUND_FILTER_PX
+"""GROUND_FILTER_PX in pixels of the whole image, where the ground has half the resolution."""
 
 Array = NDArray[np.float64]
 
@@ -87,7 +84,7 @@ def ground_plan(
     if props:
         parts = [prop_box(prop) for prop in props]
         seen_props = tiles.touched(np.stack([part.corners_mm for part in parts]))
-        shades = tiles.touched(_reaches(parts, ground, view, lights[:1], _SHADED_MM)[0])
+        shades = tiles.touched(_reaches(parts, ground, view, lights[:1], PROP_SHADE_M / MM)[0])
         shown, shaded = _any(seen_props), _any(shades)
         masks = np.concatenate([bit_masks(seen_props), bit_masks(shades)], axis=-1)
     wet = ground.wetness > 0

@@ -16,7 +16,7 @@ from fastgen.light.ground_light import (
     mean_albedo,
 )
 from fastgen.render.blocks import MAX_BOXES
-from fastgen.render.constants import GROUND_FADE_START
+from fastgen.render.constants import CYLINDER, GROUND_FADE_START
 from fastgen.render.rust import normal_threshold
 from fastgen.scene import Ground, Prop
 from fastgen.scene.boxes import OrientedBox, prop_box
@@ -63,7 +63,7 @@ def ground_values(
         # below other boxes the grid of light is fine enough, see ground_light.LOW_GAP_M
         rows[2, place, 3] = gap + RING_BOTTOM_MM * MM if gap < LOW_GAP_M else _NO_GAP_M
     for place, prop in enumerate(props, MAX_BOXES):
-        rows[2, place] = *prop.albedo, 2.0 if prop.shape == "cylinder" else 0.0
+        rows[2, place] = *prop.albedo, CYLINDER if prop.shape == "cylinder" else 0.0
     turned = np.array([body.axes @ toward for body in bodies]).reshape(-1, 3)
     inverse = np.zeros((len(rows[0]), 4))
     inverse[places, :3] = 1 / np.where(np.abs(turned) < 1e-6, 1e-6, turned)

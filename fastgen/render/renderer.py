@@ -1,9 +1,14 @@
 """Renderer: Scene -> Frame, the owner of all GL objects.
 
 A draw is a list of passes (fastgen/render/passes). The geometry pass writes the visibility buffer:
-which surface each sample sees, and where on its sheet. Later passes draw the sky, sort the pixels
-that see surfaces into classes, and shade each class. Colour, ids, damage and depth come out of one
-draw. Labels are taken at the pixel centre and never filtered: a sample lies exactly on each centre.
+which surface each sample sees, and where on its sheet. The shading pass sorts the pixels that see
+surfaces into classes, and shades each class. A scene with one container and no ground has the
+passes geometry, background, shading. Any other scene has background, ground, then geometry and
+shading for each visible container from back to front; their shading blends over the image (OVER in
+shaders).
+
+Colour, ids, damage and depth come out of one draw. Labels are taken at the pixel centre and never
+filtered: a sample lies exactly on each centre.
 """
 
 from collections.abc import Callable, Hashable, Sequence

@@ -129,7 +129,9 @@ def scene_values(
         "container_id": prepared.numbers.container,
         "first_seal_id": prepared.numbers.first_seal,
         "undamaged_value": prepared.numbers.undamaged,
-        "ground_seen": np.zeros((6, 4)) if ground is None else np.insert(ground, 3, 1.0, axis=1),
+        "side_ground_radiance": (
+            np.zeros((6, 4)) if ground is None else np.insert(ground, 3, 1.0, axis=1)
+        ),
         "above": (*scene.spreader.albedo, float(scene.spreader.present)),
     }
 

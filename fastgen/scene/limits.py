@@ -42,7 +42,7 @@ GROUNDS = ("asphalt", "concrete", "paving")
 """Kinds of ground."""
 
 MAX_INSTANCES = 99
-"""Damages of one kind per scene. A mask value is class * 100 + instance."""
+"""Damages of one kind per scene. A mask value is category * 100 + instance."""
 
 GLYPH_RANGE = 4096
 """Upper limit of the letters in a text, exclusive. Two letter numbers a and b are stored as
