@@ -102,6 +102,22 @@ def test_shards_without_dataset_json_tell_which_options_to_repeat(copy, capsys, 
     assert content(copy) == before
 
 
+@pytest.mark.parametrize(
+    ("option", "values"),
+    [("--stems", ("seed", "short")), ("--coco-masks", ("polygon", "rle"))],
+)
+def test_both_values_of_an_option_are_named_when_it_changes(tmp_path, capsys, option, values):
+    name = option.removeprefix("--").replace("-", "_")
+    for old, new in (values, values[::-1]):
+        out = tmp_path / old
+        assert run(out, option, old) == 0
+        before = content(out)
+        assert run(out, option, new) == 2
+        error = capsys.readouterr().err
+        assert f"({name} was {old!r}, is now {new!r}); to resume, repeat the old {option}" in error
+        assert content(out) == before
+
+
 def test_the_number_of_scenes_in_a_single_shard_follows_from_its_images(tmp_path, capsys):
     assert run(tmp_path, "--shard", "3") == 0
     (tmp_path / "dataset.json").unlink()

@@ -18,6 +18,8 @@ LEFT_BEHIND = (
     "imdg/runs/detect/train/weights/best.pt",
     "imdg/runs/detect/train/args.yaml",
     "runs/events.out",
+    "shards/000009.json",
+    "shards/note.txt",
 )
 
 LISTED = [
@@ -27,6 +29,8 @@ LISTED = [
     "imdg/labels/train.cache",
     "imdg/runs/",
     "runs/",
+    "shards/000009.json",
+    "shards/note.txt",
 ]
 
 

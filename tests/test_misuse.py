@@ -176,7 +176,7 @@ def test_changed_settings_are_reported_with_both_values(copy, tmp_path, capsys):
 
 
 def test_all_changed_settings_are_reported_with_their_options(copy, capsys):
-    more = ["--seed", "4", "--quality", "draft", "--also", "ids", "--shard", "2", "--split", "val"]
+    more = ["--seed", "4", "--quality", "draft", "--also", "ids", "--shard", "3", "--split", "val"]
     more += ["--set", "weather={fog_probability: 1, rain_probability: 1, wetness: 0.8}"]
     assert main(["generate", str(copy), *ARGUMENTS, *more, "--size", "80x64"]) == 2
     error = capsys.readouterr().err

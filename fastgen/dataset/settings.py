@@ -139,14 +139,11 @@ def _settings(job: Job) -> dict[str, Any]:
         "shard_scenes": job.scenes_per_shard,
         "classes": generator.config.classes,
         "config": generator.config.to_plain(),
+        "stems": job.stems,
+        "coco_masks": job.coco_masks,
     }
     name = generator.config.postprocess
     if name:
         settings["postprocess"] = {"function": name, "sha256": source_hash(name)}
-    # older datasets lack these, so their values are those that apply without the key
-    if job.stems != "short":
-        settings["stems"] = job.stems
-    if job.coco_masks != "rle":
-        settings["coco_masks"] = job.coco_masks
     plain: dict[str, Any] = json.loads(json.dumps(settings))
     return plain

@@ -99,7 +99,8 @@ def examine(out: str) -> Findings:
     for path, (size, hashed) in (entry for files in listed for entry in files.items()):
         if not _is_intact(storage, present, path, size, hashed, faults):
             broken.add(path)
-    ours = {MANIFEST, *broken, *(path for files in listed for path in files)}
+    manifests = (manifest_path(int(number)) for number in manifest["shards"])
+    ours = {MANIFEST, *manifests, *broken, *(path for files in listed for path in files)}
     if unlisted:  # some of the other files may be theirs
         ours.update(filter(_SAMPLE.fullmatch, present))
     foreign = _foreign(present.keys() - ours, ours)
