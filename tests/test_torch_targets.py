@@ -1,5 +1,8 @@
 """Targets of each task compared with generated files, and class counts with renders."""
 
+import itertools
+from collections import Counter
+
 import numpy as np
 import pytest
 import torch
@@ -186,6 +189,33 @@ def test_damage_counts_without_gl_are_close_to_rendered_masks():
     counted = class_counts("damage", config, seed=6, size=(320, 320), scenes=20).numpy()
     assert counted[0] == rendered[0] == 80
     assert abs(counted.sum() - rendered.sum()) < 0.15 * (rendered.sum() - 80)
+
+
+@pytest.mark.parametrize(("preset", "scenes"), [("gate", 2), ("yard", 1), ("quay", 2)])
+def test_counts_of_all_containers_are_close_to_rendered_labels(preset, scenes):
+    config = Config.preset(preset)
+    rendered = Counter()
+    with Generator(config, seed=2, size=(320, 320), quality="draft") as generator:
+        for index, camera in itertools.product(range(scenes), config.cameras):
+            objects = generator.render(index, camera).objects
+            rendered.update(each.class_name for each in objects if each.bbox and not each.ignored)
+    for task in ("imdg", "damage"):
+        names = class_names(task, config)
+        counts = class_counts(task, config, seed=2, size=(320, 320), scenes=scenes)
+        counted = dict(zip(names, counts.tolist(), strict=True))
+        assert counted["container"] == pytest.approx(rendered["container"], rel=0.1)
+        for some in (("text",), names[2:]) if task == "imdg" else (names[1:],):
+            real = sum(rendered[name] for name in some)
+            assert sum(counted[name] for name in some) == pytest.approx(real, rel=0.25, abs=3)
+
+
+def test_counts_leave_out_what_fog_hides():
+    fog = {"fog_probability": 1.0, "visibility_mm": [9000, 9000]}
+    clear, foggy = (
+        class_counts("imdg", Config.from_values(values, base=Config.preset("quay")), scenes=2)
+        for values in ({"weather": {"fog_probability": 0.0}}, {"weather": fog})
+    )
+    assert 0 < foggy.sum() < clear.sum()
 
 
 def test_weights_balance_the_classes():

@@ -160,7 +160,7 @@ def visibility(
     }
 
 
-def too_little(config: Config, size: tuple[int, int], pixels: int, whole: float) -> bool:
+def too_little(config: Config, size: tuple[int, int], pixels: float, whole: float) -> bool:
     """Return whether an object is ignored because of its visible pixels.
 
     Args:

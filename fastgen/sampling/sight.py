@@ -36,7 +36,7 @@ class Sight:
 
     def __init__(self, box: OrientedBox, camera: Camera) -> None:
         self._eye = np.array(camera.position_mm)
-        points, sizes = _points_toward(box, self._eye)
+        points, sizes = points_toward(box, self._eye)
         x, y, z = view_of(replace(camera, lens=None), (1, 1)).rotation @ (points - self._eye).T
         reach = z * camera.sensor_width_mm / (2 * camera.focal_mm)
         inside = (z > 0) & (np.abs(x) <= reach) & (np.abs(y) <= reach)
@@ -132,8 +132,8 @@ def _covered(view: View, points: Array) -> float:
     return float(abs(x1 * y2 - x2 * y1))
 
 
-def _points_toward(box: OrientedBox, eye: Array) -> tuple[Array, Array]:
-    """Return points [P, 3] on the faces toward the eye, and their solid angles [P] up to scale."""
+def points_toward(box: OrientedBox, eye: Array) -> tuple[Array, Array]:
+    """Return points [P, 3] on the faces toward the eye, and the solid angle [P] of each, in sr."""
     steps = (np.arange(_STEPS) + 0.5) / _STEPS * 2 - 1
     first, second = (each.ravel() for each in np.meshgrid(steps, steps))
     start = box.axes @ (eye - box.center_mm)
@@ -146,7 +146,7 @@ def _points_toward(box: OrientedBox, eye: Array) -> tuple[Array, Array]:
         local[:, axis] = np.sign(start[axis]) * half
         local[:, one], local[:, other] = first * box.half_mm[one], second * box.half_mm[other]
         away = np.linalg.norm(local - start, axis=1)
-        area = box.half_mm[one] * box.half_mm[other]
+        area = box.half_mm[one] * box.half_mm[other] * (2 / _STEPS) ** 2
         points.append(box.center_mm + local @ box.rotation.T)
         sizes.append(area * (abs(start[axis]) - half) / away**3)
     return np.concatenate(points), np.concatenate(sizes)

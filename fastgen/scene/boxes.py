@@ -54,6 +54,12 @@ class OrientedBox:
         """Its axes [3, 3], one per row, in the world."""
         return self.rotation.T
 
+    def in_frame(self, pose: Pose) -> "OrientedBox":
+        """Return the same box with the frame of a body as its world."""
+        turn = rotation_of(pose)
+        center = turn.T @ (self.center_mm - pose.position_mm)
+        return OrientedBox(center, self.half_mm, turn.T @ self.rotation)
+
     def crossed(self, start_mm: Array, way_mm: Array) -> tuple[Array, Array]:
         """Return where straight lines enter and leave the box, in lengths of the way.
 

@@ -1,27 +1,20 @@
 """Label counts by class from scenes alone, without rendering, and class weights for a loss."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from fastgen.camera.projection import View, view_of
-from fastgen.classes import ALL_SEGMENTATION_CLASSES
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import door_number
 from fastgen.generator import Generator
-from fastgen.geometry.damage_law import amount_mm, faces, in_hole, is_marked
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.scene import Camera, Damage, Scene
+from fastgen.torch.estimates import ContainerSight, container_sights
 from fastgen.torch.plan import chosen_cameras
 from fastgen.torch.targets import class_names
 from fastgen.validation import whole
-
-_GRID = 12
-"""Points per side of the grid on which the covered part of a damage is estimated."""
 
 
 def class_counts(
@@ -34,10 +27,13 @@ def class_counts(
 ) -> torch.Tensor:
     """Count the labels of each class over the first scenes.
 
-    A marker or text counts if its outline faces the camera, covers at least labels.min_visible_px
-    pixels and has its center in the image. A damage counts if its face may be visible, it covers
-    about labels.min_visible_px pixels or more, and its center is in the image. Occlusion is
-    ignored, so counts of markers are a few percent too high.
+    All containers of a scene count, with what they carry. A container, damage, marker or text
+    counts if an estimate of its visible pixels is within the limits of labels.min_visible_px and
+    labels.min_visible_fraction.
+
+    Occlusion is approximate: containers hide each other as boxes, and spreader, vehicles, door
+    gear, and corrugation hide nothing. Containers of the panorama are not counted, although
+    `labels.background: label` gives them targets.
 
     Args:
         task: damage, imdg or door; text has no classes.
@@ -71,12 +67,9 @@ def class_counts(
             if task == "door":
                 counts[door_number(camera)] += 1
                 continue
-            counts[0] += 1  # the container, in both other tasks
-            view = view_of(camera, size)
-            if task == "damage":
-                _count_damages(counts, scene, camera, view, config)
-            else:
-                _count_decals(counts, prepared, view, config)
+            for sight in container_sights(prepared, camera, size, config):
+                for label in _labels(task, sight):
+                    counts[names.index(label)] += 1
     return torch.from_numpy(counts)
 
 
@@ -112,56 +105,11 @@ def class_weights(
     return counts.sum() / (len(counts) * counts.clamp(min=1)).float()
 
 
-def _count_damages(
-    counts: NDArray[np.int64], scene: Scene, camera: Camera, view: View, config: Config
-) -> None:
-    for damage in scene.damages:
-        # only the rim of a bulge shows from behind its face: too little to count
-        if not faces(damage, camera.position_mm):
-            continue
-        if not _inside(view, np.array(damage.origin_mm)):
-            continue
-        if (
-            _covered_px(damage, view, config.damage.mask_threshold_mm)
-            >= config.labels.min_visible_px
-        ):
-            counts[ALL_SEGMENTATION_CLASSES.index(damage.kind)] += 1
-
-
-def _covered_px(damage: Damage, view: View, threshold_mm: float) -> float:
-    """Return about how many pixels a damage covers, from a grid of points on its plane."""
-    u, v = (half * np.linspace(-1, 1, _GRID) for half in np.array(damage.size_mm) / 2)
-    offsets = u[:, None, None] * np.array(damage.along) + v[None, :, None] * np.array(damage.across)
-    points_mm = np.array(damage.origin_mm) + offsets
-    covered = np.abs(amount_mm(damage, points_mm)) > threshold_mm
-    covered |= in_hole(damage, points_mm) | is_marked(damage, points_mm)
-    pixels, _ = view.project(points_mm[[0, 0, -1, -1], [0, -1, -1, 0]])
-    x, y = pixels.T
-    area = 0.5 * abs((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
-    return float(area * covered.mean())
-
-
-def _count_decals(
-    counts: NDArray[np.int64], prepared: PreparedScene, view: View, config: Config
-) -> None:
-    labelled, outlines = prepared.decals.decals, prepared.decals.outlines_mm
-    if not labelled:
-        return
-    pixels, depth = view.project(outlines)
-    x, y = pixels[..., 0], pixels[..., 1]
-    # y points down, so an outline that is counter-clockwise on its sheet has a negative area
-    area = -0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
-    seen = (
-        (depth > 0).all(axis=1)
-        & (area >= config.labels.min_visible_px)
-        & _inside(view, outlines.mean(axis=1))
-    )
-    classes = config.markings.detection_classes
-    for decal, visible in zip(labelled, seen, strict=True):
-        counts[classes.index(decal.class_name)] += bool(visible)
-
-
-def _inside(view: View, points_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return whether world points [..., 3] lie in front of the camera and inside its image."""
-    pixels, depth = view.project(points_mm)
-    return (depth > 0) & (pixels >= 0).all(axis=-1) & (pixels < view.size).all(axis=-1)
+def _labels(task: str, sight: ContainerSight) -> Iterator[str]:
+    """Yield the class name of each label of one container in one image."""
+    if sight.container():
+        yield "container"
+    if task == "damage":
+        yield from (damage.kind for damage in sight.damages())
+    else:
+        yield from (decal.class_name for decal in sight.decals())
