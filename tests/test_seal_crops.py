@@ -17,7 +17,13 @@ from fastgen.geometry.seals import hasp_middle_mm
 from fastgen.labels.hasp_crops import LEAST_PX, hasp_crops
 from fastgen.render.settings import RenderSettings
 from fastgen.scene import Camera, Seal
-from fastgen.torch import ContainerDataset, class_names, collate_seal
+from fastgen.torch import (
+    ContainerDataset,
+    class_counts,
+    class_names,
+    class_weights,
+    collate_seal,
+)
 
 pytestmark = pytest.mark.usefixtures("no_workers")
 
@@ -103,6 +109,22 @@ def test_items_of_the_seal_task_are_the_crops_with_their_labels():
     assert len(crops) == len(labels) > 0
     assert class_names("seal") == ("open", "sealed")
     data.close()
+
+
+@pytest.mark.parametrize("preset", ["crane", "gate"])
+def test_counts_of_hasps_are_close_to_the_labels_of_rendered_crops(preset):
+    values = {"seals": {"probability": 1.0, "second": 0.5}}
+    config = Config.from_values(values, base=Config.preset(preset))
+    data = ContainerDataset("seal", config, seed=2, render=RenderSettings((640, 640), "draft"))
+    real = np.zeros(2, int)
+    for position in range(6 * len(data.cameras)):
+        real += np.bincount(data[position][1]["labels"].numpy(), minlength=2)
+    data.close()
+    assert real.min() > 1
+    counted = class_counts("seal", config, seed=2, size=(640, 640), scenes=6).numpy()
+    assert np.abs(counted - real).max() <= 1
+    weights = class_weights("seal", config, seed=2, scenes=6).numpy()
+    np.testing.assert_allclose(weights, counted.sum() / (2 * counted), rtol=1e-6)
 
 
 def test_the_seal_task_needs_a_camera_at_the_door():

@@ -10,6 +10,7 @@ from fastgen.geometry.seals import hasps_mm
 from fastgen.labels.crops import upright_crop
 from fastgen.labels.visibility import within_visibility
 from fastgen.sample import Sample
+from fastgen.scene import Scene, Seal
 from fastgen.scene.limits import HASPS
 from fastgen.scene.object_ids import scene_numbers
 
@@ -62,30 +63,55 @@ def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
         return
     numbers, seals = scene_numbers(scene)[0], {seal.hasp: seal for seal in scene.seals}
     fractions = {thing.id: thing.visible_fraction for thing in sample.objects}
-    middles = hasps_mm(scene.container.kind, range(HASPS), scene.damages)
-    steps = np.linspace(0.0, 1.0, _POINTS)
-    across = (2 * steps - 1) * _ACROSS_MM
-    up = _ABOVE_MM - steps * (_ABOVE_MM + _BELOW_MM)
-    places = np.zeros((HASPS, _POINTS, _POINTS, 3))
-    places[..., 1], places[..., 2] = across, up[:, None]
-    places += middles[:, None, None]
-    pixels, depth = view.project(places.reshape(-1, 3))
+    pixels, depth = view.project(hasp_points_mm(scene))
     within = np.logical_and(pixels >= 0, pixels < view.size)
-    inside = np.asarray(within.all(axis=1) & (depth > 0))
-    columns, rows = np.floor(np.where(inside[:, None], pixels, 0)).astype(int).T
+    inside = np.asarray(within.all(axis=-1) & (depth > 0))
+    columns, rows = np.moveaxis(np.floor(np.where(inside[..., None], pixels, 0)).astype(int), -1, 0)
     own = np.isin(sample.damage[rows, columns], [numbers.undamaged, *numbers.damages])
     if scene.weather.visibility_mm:
         own &= within_visibility(sample.depth, view, scene)[rows, columns]
-    shown = own.reshape(HASPS, -1).mean(axis=1)
-    whole = np.asarray(inside.reshape(HASPS, -1).all(axis=1))
-    for hasp, grid in enumerate(pixels.reshape(HASPS, _POINTS, _POINTS, 2)):
-        quad = grid[[0, 0, -1, -1], [0, -1, -1, 0]]
-        if not whole[hasp] or shown[hasp] < _SHOWN or not _large(quad):
-            continue
+    for hasp, quad in shown_hasps(pixels, inside, own):
         seal = seals.get(hasp)
         if seal is None or fractions[numbers.seal(seal)] >= _SEAL_SHOWN:
-            sealed = seal is not None and seal.state == "locked"
-            yield HaspCrop(hasp, sealed, upright_crop(sample.image, quad), quad)
+            yield HaspCrop(hasp, is_sealed(seal), upright_crop(sample.image, quad), quad)
+
+
+def hasp_points_mm(scene: Scene) -> NDArray[np.float64]:
+    """Return a grid of points over each crop of the first container's hasps.
+
+    Args:
+        scene: A scene with a container.
+
+    Returns:
+        float64 [HASPS, _POINTS, _POINTS, 3] after damage, in the frame of the container: rows from
+        the top, columns from the left of the door.
+    """
+    steps = np.linspace(0.0, 1.0, _POINTS)
+    points = np.zeros((HASPS, _POINTS, _POINTS, 3))
+    points[..., 1] = (2 * steps - 1) * _ACROSS_MM
+    points[..., 2] = (_ABOVE_MM - steps * (_ABOVE_MM + _BELOW_MM))[:, None]
+    middles = hasps_mm(scene.container.kind, range(HASPS), scene.damages)
+    return np.asarray(points + middles[:, None, None])
+
+
+def shown_hasps(
+    pixels: NDArray[np.float64], inside: NDArray[np.bool_], shown: NDArray[np.bool_]
+) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """Yield number and corners [4, 2] of the hasps whose crops are inside, large and not occluded.
+
+    Args:
+        pixels: Projected `hasp_points_mm`, [HASPS, _POINTS, _POINTS, 2].
+        inside: Whether each point is inside the image, [HASPS, _POINTS, _POINTS].
+        shown: Whether the image shows the container there, of the same shape.
+    """
+    for hasp, quad in enumerate(pixels[:, [0, 0, -1, -1], [0, -1, -1, 0]]):
+        if inside[hasp].all() and shown[hasp].mean() >= _SHOWN and _large(quad):
+            yield hasp, quad
+
+
+def is_sealed(seal: Seal | None) -> bool:
+    """Return whether a hasp with this seal, or none, is secured."""
+    return seal is not None and seal.state == "locked"
 
 
 def _large(quad: NDArray[np.float64]) -> bool:

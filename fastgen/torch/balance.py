@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Iterator, Sequence
+from itertools import islice
 
 import numpy as np
 import torch
@@ -9,6 +10,7 @@ import torch
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import door_number
+from fastgen.formats.seal import SEAL_CLASSES
 from fastgen.generator import Generator
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.torch.estimates import ContainerSight, container_sights
@@ -31,12 +33,15 @@ def class_counts(
     counts if an estimate of its visible pixels is within the limits of labels.min_visible_px and
     labels.min_visible_fraction.
 
+    A hasp of the first container counts if its crop is estimated to be inside the image, large
+    and not hidden.
+
     Occlusion is approximate: containers hide each other as boxes, and spreader, vehicles, door
     gear, and corrugation hide nothing. Containers of the panorama are not counted, although
     `labels.background: label` gives them targets.
 
     Args:
-        task: damage, imdg or door; text has no classes.
+        task: damage, imdg, door or seal; text has no classes.
         config: Distribution of the scenes; by default that of the preset seafront.
         seed: Seed of the scenes.
         size: (width, height) of the images in pixels.
@@ -67,7 +72,9 @@ def class_counts(
             if task == "door":
                 counts[door_number(camera)] += 1
                 continue
-            for sight in container_sights(prepared, camera, size, config):
+            sights = container_sights(prepared, camera, size, config)
+            # only the first container has door and seal crops
+            for sight in islice(sights, 1) if task == "seal" else sights:
                 for label in _labels(task, sight):
                     counts[names.index(label)] += 1
     return torch.from_numpy(counts)
@@ -107,6 +114,9 @@ def class_weights(
 
 def _labels(task: str, sight: ContainerSight) -> Iterator[str]:
     """Yield the class name of each label of one container in one image."""
+    if task == "seal":
+        yield from (SEAL_CLASSES[sealed] for sealed in sight.hasps())
+        return
     if sight.container():
         yield "container"
     if task == "damage":

@@ -11,6 +11,7 @@ from fastgen.camera.projection import View, view_of
 from fastgen.config.config import Config
 from fastgen.geometry.damage_law import amount_mm, faces, in_hole, is_marked
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.labels.hasp_crops import hasp_points_mm, is_sealed, shown_hasps
 from fastgen.labels.visibility import too_little
 from fastgen.sampling.sight import points_toward
 from fastgen.scene import Camera, Damage, Decal, Pose, Scene
@@ -45,8 +46,7 @@ class ContainerSight:
 
     def shown(self, points_mm: Array) -> Mask:
         """Return whether the image shows points [..., 3]: nothing hides them, and no fog."""
-        pixels, depth = self.view.project(points_mm)
-        shown: Mask = (depth > 0) & ((pixels >= 0) & (pixels < self.view.size)).all(axis=-1)
+        shown = self._inside(points_mm)
         for box in self.others:
             shown &= ~box.between(self._eye_mm, points_mm)
         visibility_mm = self._scene.weather.visibility_mm
@@ -90,6 +90,14 @@ class ContainerSight:
             if self._labelled(share * whole, whole):
                 yield decal
 
+    def hasps(self) -> Iterator[bool]:
+        """Yield True or False, sealed or open, for each hasp of the door that gets a crop."""
+        points_mm = hasp_points_mm(self._scene)
+        pixels, _ = self.view.project(points_mm)
+        seals = {seal.hasp: seal for seal in self._scene.seals}
+        for hasp, _ in shown_hasps(pixels, self._inside(points_mm), self.shown(points_mm)):
+            yield is_sealed(seals.get(hasp))
+
     @property
     def _scene(self) -> Scene:
         return self.prepared.scene
@@ -97,6 +105,11 @@ class ContainerSight:
     @cached_property
     def _eye_mm(self) -> Array:
         return self.view.position_m / MM
+
+    def _inside(self, points_mm: Array) -> Mask:
+        pixels, depth = self.view.project(points_mm)
+        inside: Mask = (depth > 0) & ((pixels >= 0) & (pixels < self.view.size)).all(axis=-1)
+        return inside
 
     def _labelled(self, pixels: float, whole: float) -> bool:
         return not too_little(self.config, self.view.size, pixels, whole)
