@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import torch
 
-from fastgen import Config
+from fastgen import Config, Generator
 from fastgen.errors import ConfigError
+from fastgen.formats.door import door_class
 from fastgen.light.hdri import bundled_hdris
 from fastgen.torch import (
     ContainerDataset,
@@ -28,6 +29,20 @@ SLANTED = Config.from_values({"cameras": {"Cr": {"azimuth_deg": [40, 80]}, "Cl":
 
 def test_the_door_task_takes_the_cameras_that_always_see_an_end():
     assert ContainerDataset("door", SLANTED, length=2, render=SMALL).cameras == ("Cl",)
+
+
+@pytest.mark.parametrize(("preset", "camera"), [("yard", "pole_door"), ("quay", "end_left")])
+def test_the_door_task_says_which_cameras_it_needs(preset, camera):
+    config = Config.preset(preset)
+    seen = {door_class(Generator(config, seed=1).scene(i).camera(camera)) for i in range(3)}
+    assert seen & {"door", "no_door"}  # `fastgen generate` writes these images
+    words = "looks at an end of the container in every scene; .* azimuth_deg .* within 45 degrees"
+    with pytest.raises(ConfigError, match=words):
+        ContainerDataset("door", config, render=SMALL)
+    angles = {"azimuth_deg": [-30, 30], "elevation_deg": [10, 30]}
+    nearer = {each: angles if each == camera else {} for each in config.cameras}
+    config = Config.from_values({"cameras": nearer}, base=config)
+    assert ContainerDataset("door", config, render=SMALL).cameras == (camera,)
 
 
 def dataset_of(task="imdg", config=None, length=23, size=(64, 64), form="detection", **scenes):

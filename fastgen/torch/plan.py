@@ -25,6 +25,13 @@ Curriculum = Callable[[int], Config | Mapping[str, Any]]
 """Returns the configuration of an epoch, or values that replace those of the dataset's."""
 
 
+_AT_AN_END = (
+    "give a camera with face door or no_door whose azimuth_deg and elevation_deg together keep it "
+    "within 45 degrees of the long axis"
+)
+"""How to get cameras that suit the door task."""
+
+
 @dataclass(frozen=True)
 class SceneSettings:
     """Scenes of an epoch, and the cameras that see them.
@@ -121,17 +128,16 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
         raise ConfigError(f"cameras: {cameras!r} is not a list; give [{cameras!r}]")
     usable = [name for name in rig if _suits(task, rig[name])]
     if not usable:
-        where = "an end of the container" if task == "door" else "the door"
+        where = "the door"
+        if task == "door":
+            where = f"an end of the container in every scene; {_AT_AN_END}"
         raise ConfigError(f"cameras: none of {', '.join(rig)} looks at {where}")
     chosen = tuple(usable if cameras is None else cameras)
     for name in chosen:
         if name not in usable:
             why = nearest(name, usable)
             if task == "door" and name in rig:
-                why = (
-                    "; it needs a camera at an end of the container whose azimuth_deg and "
-                    "elevation_deg together keep it within 45 degrees of the long axis"
-                )
+                why = f"; {_AT_AN_END}"
             raise ConfigError(f"cameras: {name!r} does not suit the {task} task{why}")
     if not chosen or len(set(chosen)) != len(chosen):
         raise ConfigError("cameras: give at least one name, and each only once")
