@@ -172,6 +172,16 @@ def test_bad_ranks_states_and_batches_are_named():
         dataset()[23]
 
 
+@pytest.mark.parametrize("make", [dataset, stream])
+@pytest.mark.parametrize("value", [False, 0, None])
+def test_a_loader_refuses_batches_out_of_order(make, value):
+    with pytest.raises(
+        ConfigError, match="in_order: a Loader resumes exactly only with batches in order"
+    ):
+        Loader(make(), num_workers=2, in_order=value)
+    assert Loader(make(), num_workers=2, in_order=True).in_order
+
+
 def picture(path, level):
     radiance = np.full((128, 256, 3), level, np.float32)
     assert cv2.imwrite(str(path), radiance)

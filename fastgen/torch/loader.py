@@ -121,6 +121,11 @@ class Loader:
                     f"{name}: a Loader divides the positions itself; leave it out, or give it to "
                     "torch's own DataLoader"
                 )
+        if options.get("in_order", True) is not True:
+            raise ConfigError(
+                "in_order: a Loader resumes exactly only with batches in order; leave it out, or "
+                "give it to torch's own DataLoader"
+            )
         self.dataset = dataset
         self.batch_size, self.drop_last = whole("batch_size", batch_size, 1), drop_last
         self._shuffle = shuffle
