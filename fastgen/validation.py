@@ -186,6 +186,17 @@ def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
     raise ConfigError(f"{name}: {shown(value)} is not a whole number of {wanted}")
 
 
+def flag(name: str, value: Any) -> bool:
+    """Return `value` as a bool if it is one of Python or NumPy.
+
+    Raises:
+        ConfigError: otherwise; the message starts with `name`.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise ConfigError(f"{name}: expected true or false, got {shown(value)}")
+    return bool(value)
+
+
 def to_plain(value: Any) -> Any:
     """Return dataclasses, tuples and mappings as the dicts, lists and scalars of JSON and YAML."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):

@@ -68,6 +68,40 @@ def test_locate_refuses_positions_that_are_no_whole_numbers(position):
         dataset().locate(position)
 
 
+@pytest.mark.parametrize("epoch", [-1, 1.5, "a", True, 10**10])
+@pytest.mark.parametrize("name", ["locate", "sample", "item"])
+def test_epochs_that_do_not_exist_are_refused(name, epoch):
+    data = dataset()
+    with pytest.raises(ConfigError, match=r"epoch: .* is not a whole number of 0"):
+        getattr(data, name)(0, epoch)
+    with pytest.raises(ConfigError, match=r"epoch: .* is not a whole number of 0"):
+        data.config_at(epoch)
+    assert data.locate(0, np.int64(2)) == data.locate(0, 2.0) == data.locate(0, 2)
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (ItemSettings, "as_float"),
+        (ItemSettings, "pairs"),
+        (SceneSettings, "fixed"),
+        (SceneSettings, "all_views"),
+        (lambda **flags: Loader(dataset(), **flags), "shuffle"),
+        (lambda **flags: Loader(dataset(), **flags), "drop_last"),
+        (lambda **flags: ShardSampler(dataset(), **flags), "shuffle"),
+        (lambda **flags: ContainerStream(dataset(), **flags), "endless"),
+    ],
+)
+def test_only_booleans_are_accepted_as_booleans(make, name):
+    for value in ("no", "False", 0, 1, None):
+        with pytest.raises(ConfigError, match=f"^{name}: expected true or false, got"):
+            make(**{name: value})
+    for value in (False, True, np.True_):
+        make(**{name: value})
+    if make in (ItemSettings, SceneSettings):
+        assert getattr(make(**{name: np.True_}), name) is True
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

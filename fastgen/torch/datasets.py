@@ -29,7 +29,7 @@ from fastgen.torch.plan import (
 )
 from fastgen.torch.rendering import LocalGenerator
 from fastgen.torch.targets import Collate, Item, ItemSettings, check_items, collate_of, item_of
-from fastgen.validation import whole
+from fastgen.validation import flag, whole
 
 MAX_LENGTH = EPOCH_SCENES // 100
 """Most images in an epoch. A split with 1 % of the scenes still fits before the next epoch."""
@@ -174,14 +174,18 @@ class ContainerDataset(Dataset[Item]):
 
     def locate(self, position: int, epoch: int | None = None) -> tuple[int, str]:
         """Return scene index and camera name at a position of an epoch, by default the current."""
-        return self._plan.locate(self.epoch if epoch is None else epoch, position)
+        return self._plan.locate(self._chosen(epoch), position)
 
     def sample(self, position: int, epoch: int | None = None) -> Sample:
         """Return the Sample from which the item at a position is made.
 
         With `items.pairs` it is the one with damages.
         """
-        return self._sample(position, self.epoch if epoch is None else epoch)
+        return self._sample(position, self._chosen(epoch))
+
+    def _chosen(self, epoch: int | None) -> int:
+        """Return an epoch after checking it; None stands for the current one."""
+        return self.epoch if epoch is None else whole("epoch", epoch, 0, MAX_EPOCH)
 
     def _sample(self, position: int, epoch: int, undamaged: bool = False) -> Sample:
         index, camera = self._plan.locate(epoch, position)
@@ -200,7 +204,7 @@ class ContainerDataset(Dataset[Item]):
         item_of describes both. With `items.pairs` these are a tuple of two images and a tuple of
         their targets, the one with damages first.
         """
-        epoch = self.epoch if epoch is None else epoch
+        epoch = self._chosen(epoch)
         made = self._made(position, epoch)
         if self.items.pairs:
             images, targets = zip(made, self._made(position, epoch, undamaged=True), strict=True)
@@ -236,6 +240,7 @@ class ContainerDataset(Dataset[Item]):
 
     def config_at(self, epoch: int) -> Config:
         """Return the configuration of an epoch."""
+        epoch = whole("epoch", epoch, 0, MAX_EPOCH)
         last = self._epoch_config
         if last[0] != epoch:
             config = config_of(self.scenes.curriculum, self.config, epoch)
@@ -300,7 +305,7 @@ class ContainerStream(IterableDataset[Item]):
                 f"dataset: {type(dataset).__name__} is not a ContainerDataset; give one"
             )
         self.dataset = dataset
-        self.length = None if endless else len(dataset)
+        self.length = None if flag("endless", endless) else len(dataset)
         self.batch_size = whole("batch_size", batch_size, 1)
         self._rank, self._world_size = rank, world_size
         # first position, rank and world size: workers read them, but torch.distributed does not run

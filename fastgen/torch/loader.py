@@ -11,7 +11,7 @@ from fastgen.errors import ConfigError, shown
 from fastgen.sampling.scene import stream
 from fastgen.torch.datasets import MOST_DIGESTS, ContainerDataset, ContainerStream
 from fastgen.torch.plan import MAX_EPOCH, shard
-from fastgen.validation import whole
+from fastgen.validation import flag, whole
 
 
 class ShardSampler(Sampler[int]):
@@ -43,7 +43,7 @@ class ShardSampler(Sampler[int]):
     ) -> None:
         shard(rank, world_size)  # refuses bad values here, not in a pass
         self.resume_at, self.start = (0, 0), 0
-        self._dataset, self._shuffle = dataset, shuffle
+        self._dataset, self._shuffle = dataset, flag("shuffle", shuffle)
         self._rank, self._world_size = rank, world_size
 
     @property
@@ -127,11 +127,12 @@ class Loader:
                 "give it to torch's own DataLoader"
             )
         self.dataset = dataset
-        self.batch_size, self.drop_last = whole("batch_size", batch_size, 1), drop_last
-        self._shuffle = shuffle
+        self.batch_size = whole("batch_size", batch_size, 1)
+        self.drop_last = flag("drop_last", drop_last)
+        self._shuffle = flag("shuffle", shuffle)
         self.sampler: ShardSampler | ContainerStream
         if isinstance(dataset, ContainerStream):
-            if shuffle or rank is not None or world_size is not None:
+            if self._shuffle or rank is not None or world_size is not None:
                 raise ConfigError("shuffle, rank, world_size: a stream has its own; leave them out")
             dataset.batch_size = self.batch_size
             self._items, self.sampler = dataset.dataset, dataset
@@ -149,7 +150,7 @@ class Loader:
             dataset,
             batch_size=self.batch_size,
             sampler=None if isinstance(dataset, ContainerStream) else self.sampler,
-            drop_last=drop_last,
+            drop_last=self.drop_last,
             **{**options, "collate_fn": options.get("collate_fn") or self._items.collate},
         )
 

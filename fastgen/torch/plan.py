@@ -13,7 +13,7 @@ from fastgen.errors import ConfigError, nearest
 from fastgen.formats.door import always_at_an_end
 from fastgen.sampling.scene import SPLITS, split_of
 from fastgen.torch.targets import class_names
-from fastgen.validation import check_known, whole
+from fastgen.validation import check_known, flag, whole
 
 EPOCH_SCENES = 10**9
 """Epoch e starts at scene index e times this, so that no two epochs share a scene."""
@@ -46,6 +46,9 @@ class SceneSettings:
             camera, and the next scene by the next camera.
         curriculum: Called with the epoch. Returns the epoch's Config, or values that replace those
             of the dataset's Config, nested as in a configuration file.
+
+    Raises:
+        ConfigError: `fixed` or `all_views` is not a boolean. ContainerDataset checks the rest.
     """
 
     cameras: Sequence[str] | None = None
@@ -53,6 +56,11 @@ class SceneSettings:
     fixed: bool = False
     all_views: bool = True
     curriculum: Curriculum | None = None
+
+    def __post_init__(self) -> None:
+        """Check the booleans, and turn those of NumPy into Python's."""
+        for name in ("fixed", "all_views"):
+            object.__setattr__(self, name, flag(name, getattr(self, name)))
 
 
 class Plan:

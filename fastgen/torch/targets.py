@@ -26,7 +26,7 @@ from fastgen.labels.crops import crop_box, text_crops
 from fastgen.labels.hasp_crops import hasp_crops
 from fastgen.labels.visibility import window
 from fastgen.sample import Box, Object, Sample
-from fastgen.validation import check_known
+from fastgen.validation import check_known, flag
 
 Item = tuple[Any, Any]
 """Image and target of one sample; `item_of` describes both for each task and form."""
@@ -68,8 +68,10 @@ class ItemSettings:
     pairs: bool = False
 
     def __post_init__(self) -> None:
-        """Check the values."""
+        """Check the values, and turn booleans of NumPy into Python's."""
         check_known("form", self.form, FORMS)
+        for name in ("as_float", "pairs"):
+            object.__setattr__(self, name, flag(name, getattr(self, name)))
         if not (self.transforms is None or callable(self.transforms)):
             raise ConfigError(
                 f"transforms: {self.transforms!r} is not a function of image and target"
