@@ -10,7 +10,7 @@ from typing import Any, Self
 from fastgen.batch import items_of
 from fastgen.camera.projection import view_of
 from fastgen.config.config import Config, LabelConfig
-from fastgen.decals.own_art import art_of
+from fastgen.decals.own_art import images_of
 from fastgen.decals.own_fonts import OwnPrints
 from fastgen.errors import ConfigError, nearest
 from fastgen.finishing import labelled, with_camera_model, with_radiance
@@ -106,7 +106,7 @@ class Generator:
         self._given: tuple[tuple[Scene, PreparedScene], ...] = ()
         markings = self.config.markings
         own = OwnPrints(
-            {name: art_of(text) for name, text in markings.own_art.items()},
+            images_of(markings.own_art),
             tuple(chain.from_iterable(markings.read_fonts().values())),
         )
         self._own_decals = OwnDecals(

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import cv2
 import numpy as np
 import pytest
 import yaml
@@ -136,6 +137,22 @@ def test_pixels_of_a_marker_and_of_a_sticker_have_the_colour_of_their_file(confi
                 seen[item.class_name] += 1
     assert seen["ENV"] > 2
     assert seen["tag"] > 2
+
+
+def test_a_marker_covers_no_pixel_beside_its_diamond(config, generators):
+    """The file is an opaque green square. Nearby the shader cuts it, far away its texels do."""
+    generator = generators(config, 0, (320, 320), quality="draft")
+    shown = 0
+    for index, camera in ((0, "A"), (1, "Cl"), (2, "A"), (3, "Cr")):
+        sample = generator.render(index, camera)
+        ids = [item.id for item in sample.objects if item.class_name == "ENV"]
+        inside = np.isin(sample.ids, ids).astype(np.uint8)
+        beside = (cv2.dilate(inside, np.ones((13, 13))) > cv2.dilate(inside, np.ones((3, 3)))) > 0
+        red, green, blue = np.moveaxis(sample.image.astype(int), -1, 0)
+        green_pixels = green > 2 * np.maximum(red, blue)
+        assert not (green_pixels & beside).any()
+        shown += int((green_pixels & (inside > 0)).sum())
+    assert shown > 100
 
 
 def test_the_example_of_the_docs_page_is_drawn(tmp_path):

@@ -7,6 +7,7 @@ without the files that they came from.
 import base64
 import binascii
 import struct
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
@@ -77,6 +78,33 @@ def art_of(text: str) -> NDArray[np.uint8]:
     image = _decoded("image", data)
     image.flags.writeable = False
     return image
+
+
+def images_of(art: Mapping[str, str]) -> dict[str, NDArray[np.uint8]]:
+    """Return the images of a configuration by their names in scenes, see `art_of`.
+
+    Args:
+        art: Texts by name. Images of names that begin with "marker/" are cut to the diamond.
+    """
+    images = {name: art_of(text) for name, text in art.items()}
+    return {
+        name: _cut_to_diamond(image) if name.startswith("marker/") else image
+        for name, image in images.items()
+    }
+
+
+def _cut_to_diamond(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a square image, transparent outside the diamond whose tips touch its sides.
+
+    Texels on its edge keep the share of their alpha that is inside, so that filtered artwork covers
+    as much as the diamond.
+    """
+    side = len(image)
+    from_center = np.abs(np.arange(side) + 0.5 - side / 2)
+    inside = (side / 2 - from_center[:, None] - from_center) / np.sqrt(2)  # texels to the edge
+    found = image.copy()
+    found[..., 3] = np.rint(image[..., 3] * np.clip(inside + 0.5, 0, 1))
+    return found
 
 
 def content_of(path: Path) -> bytes:
