@@ -306,11 +306,11 @@ class Generator:
         with self.gpu.drawing() as renderer:
             return renderer.bake_ground(self._prepared(scene), texel_mm)
 
-    def exposure(self, scene: Scene, camera: Camera) -> float:
+    def exposure(self, scene: Scene, camera: str | Camera) -> float:
         """Return the factor on linear radiance that a camera applies before the tone curve."""
+        prepared, chosen = self._chosen(None, camera, scene)
         with self.gpu.drawing() as renderer:
-            checked = self._prepared(scene).scene
-            return renderer.exposure(checked, check_camera(camera, checked), self.size).factor
+            return renderer.exposure(prepared.scene, chosen, self.size).factor
 
     def checked(self, scene: Scene) -> Scene:
         """Return a copy of a scene that this generator can draw, see `check_scene`.

@@ -9,11 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from fastgen.errors import ConfigError, FastgenError
+from fastgen.classes import ALL_DETECTION_CLASSES, ALL_SEGMENTATION_CLASSES
+from fastgen.errors import ConfigError, FastgenError, nearest, shown
 from fastgen.sample import Sample
 
 Postprocess = Callable[[Sample, np.random.Generator], Sample]
 """Takes a sample and a random generator of its own, and returns the changed sample."""
+
+_CLASSES = (*ALL_DETECTION_CLASSES, *ALL_SEGMENTATION_CLASSES, "spreader", "seal")
+"""Classes that objects of any configuration may have."""
 
 _ARRAYS = ("image", "ids", "damage", "depth")
 """Arrays that keep their shape and type."""
@@ -69,4 +73,23 @@ def postprocessed(sample: Sample, name: str, rng: np.random.Generator) -> Sample
                 f"postprocess: {name} returned {field} as {now.dtype} {list(now.shape)}; keep "
                 f"{before.dtype} {list(before.shape)}"
             )
+    _check_objects(sample, made, name)
     return made
+
+
+def _check_objects(sample: Sample, made: Sample, name: str) -> None:
+    """Raise FastgenError unless classes and boxes of the objects of `made` can be written."""
+    known = {*sample.marker_classes, *_CLASSES, *(each.class_name for each in sample.objects)}
+    width, height = sample.view.size
+    for item in made.objects:
+        if item.class_name not in known:
+            raise FastgenError(
+                f"postprocess: {name} returned an object of the class {shown(item.class_name)}"
+                f"{nearest(item.class_name, known)}"
+            )
+        x0, y0, x1, y1 = item.bbox or (0, 0, width, height)
+        if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+            raise FastgenError(
+                f"postprocess: {name} returned the box {item.bbox} of {item.class_name}; give x0 < "
+                f"x1 and y0 < y1 within {width}x{height} pixels, or None"
+            )

@@ -355,6 +355,10 @@ def nothing(sample, rng):
     return None
 def smaller(sample, rng):
     return replace(sample, image=sample.image[1:])
+def renamed(sample, rng):
+    return replace(sample, objects=[replace(sample.objects[0], class_name="spreadr")])
+def emptied(sample, rng):
+    return replace(sample, objects=[replace(sample.objects[0], bbox=(5, 5, 2, 2))])
 NUMBER = 1
 """
 
@@ -381,6 +385,12 @@ def faulty(tmp_path_factory):
             "faulty:smaller",
             "postprocess: faulty:smaller returned image as uint8 [191, 192, 3]; keep",
         ),
+        (
+            "faulty:renamed",
+            "postprocess: faulty:renamed returned an object of the class 'spreadr' (did you mean "
+            "spreader?)",
+        ),
+        ("faulty:emptied", "postprocess: faulty:emptied returned the box (5, 5, 2, 2) of"),
     ],
 )
 def test_an_unusable_function_gets_one_line(name, words, faulty, tmp_path, monkeypatch, capsys):

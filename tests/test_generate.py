@@ -59,6 +59,16 @@ def records(out):
     return [json.loads(p.read_text()) for p in sorted(out.glob("scenes/*/*.json"))]
 
 
+def test_a_quiet_run_names_failed_scenes(tmp_path, monkeypatch, capsys):
+    failed = [{"scene": 3, "seed": 0, "error": "no room"}]
+    manifest = {"files": {}, "counts": {"train": {"images": 0}}, "failed": failed}
+    monkeypatch.setattr("fastgen.cli.dataset_commands.generate", lambda *_: manifest)
+    assert main(["generate", str(tmp_path), "--images", "1", "--quiet"]) == 1
+    printed, said = capsys.readouterr()
+    assert printed == ""
+    assert said == "fastgen: scene 3 of seed 0 failed: no room\n"
+
+
 def test_every_file_of_the_layout_exists(dataset):
     assert len(list(dataset.glob("images/*/*.jpg"))) == 14
     for record in records(dataset):

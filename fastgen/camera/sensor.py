@@ -8,6 +8,7 @@ exposure.
 
 from dataclasses import replace
 from functools import lru_cache
+from zlib import crc32
 
 import cv2
 import numpy as np
@@ -30,7 +31,7 @@ from fastgen.camera.weather import BACKDROP_M, add_fog, add_rain
 from fastgen.frame import Frame
 from fastgen.scene import Camera, Color, Ground
 from fastgen.scene.limits import MM
-from fastgen.scene.optics import Sensor, Weather
+from fastgen.scene.optics import Rain, Sensor, Weather
 
 _UNMETERED = Exposure(1.0)
 
@@ -86,7 +87,8 @@ def apply_camera_model(
     if needs_radiance(camera, weather):
         assert frame.radiance is not None, "render with radiance=True"
         sky = np.array(airlight, np.float32)
-        light = _through_weather(frame, view, weather, sky, ground)
+        seen = replace(weather, rain=weather.rain and _rain_of(weather.rain, camera, exposure))
+        light = _through_weather(frame, view, seen, sky, ground)
         if sensor.meter:
             times = _for_highlights(light, sensor)
             if times < 1:
@@ -101,6 +103,12 @@ def apply_camera_model(
     if sensor.jpeg_quality:
         image = compress_jpeg(image, sensor.jpeg_quality)
     return image
+
+
+def _rain_of(rain: Rain, camera: Camera, exposure: Exposure) -> Rain:
+    """Return the rain that a camera sees: drops of its own, during the exposure of its meter."""
+    own = np.random.SeedSequence((rain.seed, crc32(camera.name.encode()))).generate_state(1)
+    return replace(rain, seed=int(own[0]), shutter_s=exposure.shutter_s or rain.shutter_s)
 
 
 def _has_fog_or_rain(weather: Weather) -> bool:

@@ -19,7 +19,7 @@ from fastgen.cli.options import (
     summarize,
 )
 from fastgen.dataset.addresses import place_of
-from fastgen.dataset.console import tell
+from fastgen.dataset.console import say, tell
 from fastgen.dataset.finish import CONTACT_SHEET
 from fastgen.dataset.generate import generate
 from fastgen.dataset.job import COCO_MASKS, LAYOUTS, SHARD_SCENES, STEMS, Job
@@ -245,13 +245,16 @@ def _generate(options: argparse.Namespace) -> int:
     runner = None if options.ray is None else run_on_ray(options.ray or None, options.workers)
     manifest = generate(job, options.workers, runner)
     look = f"; look at {options.out}/{CONTACT_SHEET}" if CONTACT_SHEET in manifest["files"] else ""
-    failures = (
+    failures = [
         f"scene {each['scene']} of seed {each['seed']} failed: {each['error']}"
         for each in manifest["failed"]
-    )
+    ]
     result = _result(options.out, manifest)
     lines = (f"{result['images']} images in {options.out}{look}", *failures)
     summarize(options, result, lines)
+    if options.quiet:
+        for failure in failures:
+            say(f"fastgen: {failure}")
     return 1 if manifest["failed"] else 0
 
 

@@ -141,7 +141,7 @@ class MarkingsConfig:
     marker_faces: tuple[Face, ...] = ("front", "back", "door", "no_door")
     marked_containers: Share = 1.0
     markers_per_face: Annotated[tuple[int, int], Bounds(0, 300)] = (1, 6)
-    marker_side_mm: Annotated[Range, Bounds(40, 5000, "mm")] = Range(250, 300)
+    marker_side_mm: Annotated[Range, Bounds(100, 5000, "mm")] = Range(250, 300)
     marker_gap_mm: Annotated[Range, LENGTH] = Range(8, 40)
     marker_tilt_deg: Annotated[Range, Bounds(-45, 45, "degrees")] = Range(-2.5, 2.5)
     marker_wear: Annotated[Range, UNIT] = Range(0.0, 0.6)

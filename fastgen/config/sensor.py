@@ -236,7 +236,7 @@ class WeatherConfig:
         rain_up_to_lx: Most light of the environment on level ground with which rain falls. Below
             rain clouds it is about 10000. The default is no limit, so rain also falls in sunshine.
         rate_mm_h: Water that falls as rain.
-        shutter_s: Exposure time in which a drop draws its streak.
+        shutter_s: Exposure time in which a drop draws its streak, for cameras without a meter.
         wind: Speed of the drops across the image, as a multiple of their falling speed.
         wet_probability: Probability that a scene without rain is wet.
         wetness: Wetness of paint during or after rain.

@@ -237,7 +237,7 @@ class Rain:
 
     Attributes:
         rate_mm_h: Water that falls, in mm per hour.
-        shutter_s: Exposure time in which a drop draws its streak.
+        shutter_s: Exposure time in which a drop draws its streak, for cameras without a meter.
         wind: Speed of the drops across the image, as a multiple of their falling speed.
         seed: Seed of their positions.
     """
