@@ -32,7 +32,7 @@ from reporting import origin, parse_size, save
 from fastgen import Config, Generator
 from fastgen.classes import ALL_DAMAGE_CLASSES
 from fastgen.errors import ConfigError
-from fastgen.sampling.scene import stream
+from fastgen.sampling.streams import stream
 from fastgen.scene import Camera, Damage, Scene
 
 VISIBLE_LEVELS = 6.0

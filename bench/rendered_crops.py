@@ -27,7 +27,7 @@ from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.labels.objects import labelled_decals
 from fastgen.sample import Object, Sample
-from fastgen.sampling.scene import stream
+from fastgen.sampling.streams import stream
 from fastgen.scene import Camera, Decal, Scene
 
 MARKER_PX = 48

@@ -15,7 +15,7 @@ from fastgen.postprocess import postprocessed
 from fastgen.render.draw_inputs import ImageRequest
 from fastgen.render.renderer import Renderer
 from fastgen.sample import Sample
-from fastgen.sampling.scene import stream
+from fastgen.sampling.streams import stream
 
 
 def with_radiance(image: ImageRequest) -> ImageRequest:

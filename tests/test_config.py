@@ -15,7 +15,8 @@ from fastgen.errors import ConfigError
 from fastgen.geometry.damage_law import deform
 from fastgen.sampling.contents import sample_contents
 from fastgen.sampling.coverage import possible_shapes
-from fastgen.sampling.scene import environment_weights, sample_scene, stream
+from fastgen.sampling.scene import environment_weights, sample_scene
+from fastgen.sampling.streams import stream
 from fastgen.validation import Bounds, annotation
 from tests.plain import FEW_DECALS
 

@@ -15,8 +15,7 @@ from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.geometry.container import build_container
 from fastgen.sampling.damage import sample_damages
-from fastgen.sampling.scene import stream
-from fastgen.sampling.streams import weighted_choice
+from fastgen.sampling.streams import stream, weighted_choice
 from fastgen.scene import Scene
 from fastgen.scene.check import check_scene
 from fastgen.scene.container_kinds import KINDS

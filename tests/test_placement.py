@@ -12,7 +12,8 @@ from fastgen.config.config import Config
 from fastgen.config.surroundings import ARRANGEMENTS
 from fastgen.errors import ConfigError
 from fastgen.sampling.contents import Contents, sample_contents
-from fastgen.sampling.scene import sample_scene, stream, without_container
+from fastgen.sampling.scene import sample_scene, without_container
+from fastgen.sampling.streams import stream
 from fastgen.scene import Scene
 from fastgen.scene.check import check_scene
 from fastgen.scene.container_kinds import KINDS

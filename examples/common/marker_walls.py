@@ -21,7 +21,7 @@ from fastgen.light.sky_visibility import open_sky
 from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.sample import Object, Sample
 from fastgen.sampling.contents import sheet_sizes
-from fastgen.sampling.scene import stream
+from fastgen.sampling.streams import stream
 from fastgen.scene import Decal, Scene, Spreader
 
 CAMERAS = ("Cl", "Cr")

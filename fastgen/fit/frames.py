@@ -21,8 +21,9 @@ from fastgen.generator import Generator
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.exposure import airlight
 from fastgen.light.hdri import hours_of, kind_of
-from fastgen.sampling.scene import environment_weights, sample_scene, stream
+from fastgen.sampling.scene import environment_weights, sample_scene
 from fastgen.sampling.sensor import sample_moment, sample_sensor
+from fastgen.sampling.streams import stream
 from fastgen.scene import Camera, Color, Scene
 
 LIGHTS = {

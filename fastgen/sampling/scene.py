@@ -4,7 +4,6 @@ Each property has its own random stream, named after the property. New propertie
 draws therefore leave all other properties of a scene unchanged.
 """
 
-import hashlib
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -32,7 +31,7 @@ from fastgen.sampling.neighbours import (
 )
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
 from fastgen.sampling.sight import DamageSight
-from fastgen.sampling.streams import Streams, one_of, weighted_choice
+from fastgen.sampling.streams import Streams, one_of, stream, weighted_choice
 from fastgen.scene import (
     Camera,
     EnvironmentView,
@@ -45,21 +44,6 @@ from fastgen.scene.limits import MAX_INSTANCES
 from fastgen.validation import check_weights
 
 SPLITS = ("train", "val", "test")
-
-
-def stream(seed: int, index: int, name: str) -> np.random.Generator:
-    """Return the random generator of one property of one scene.
-
-    Args:
-        seed: Seed of the dataset.
-        index: Index of the scene.
-        name: Name of the property.
-
-    Returns:
-        PCG64 generator seeded with a hash of the arguments, independent of all other generators.
-    """
-    key = hashlib.blake2b(f"{seed}/{index}/{name}".encode(), digest_size=16).digest()
-    return np.random.Generator(np.random.PCG64(int.from_bytes(key, "little")))
 
 
 def sample_scene(config: Config, seed: int, index: int, environments: Mapping[str, float]) -> Scene:

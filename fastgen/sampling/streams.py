@@ -4,6 +4,7 @@
 draw the same values in less time.
 """
 
+import hashlib
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
@@ -15,6 +16,21 @@ Streams = Callable[[str], np.random.Generator]
 """Function from the name of a property to its independent random generator."""
 
 T = TypeVar("T")
+
+
+def stream(seed: int, index: int, name: str) -> np.random.Generator:
+    """Return the random generator of one property of one scene.
+
+    Args:
+        seed: Seed of the dataset.
+        index: Index of the scene.
+        name: Name of the property.
+
+    Returns:
+        PCG64 generator seeded with a hash of the arguments, independent of all other generators.
+    """
+    key = hashlib.blake2b(f"{seed}/{index}/{name}".encode(), digest_size=16).digest()
+    return np.random.Generator(np.random.PCG64(int.from_bytes(key, "little")))
 
 
 def one_of(rng: np.random.Generator, choices: Sequence[T]) -> T:

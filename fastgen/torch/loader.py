@@ -8,7 +8,7 @@ from typing import Any
 from torch.utils.data import DataLoader, Sampler
 
 from fastgen.errors import ConfigError, shown
-from fastgen.sampling.scene import stream
+from fastgen.sampling.streams import stream
 from fastgen.torch.datasets import MOST_DIGESTS, ContainerDataset, ContainerStream
 from fastgen.torch.plan import MAX_EPOCH, shard
 from fastgen.validation import flag, whole
