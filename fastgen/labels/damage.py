@@ -86,9 +86,9 @@ def _alone(
     places, beyond = [np.zeros((2, 0), np.int64)], 0
     seen = project(shot.prepared.damage_facets(number), shot.view)
     for points in surface_points(seen, shot.view.size):
-        part, hidden = _damaged(shot, damage, points, value)
-        column, row, within = (a.take(part) for a in (points.column, points.row, points.within))
-        if not len(part):
+        chosen, hidden = _damaged(shot, damage, points, value)
+        column, row, within = (a.take(chosen) for a in (points.column, points.row, points.within))
+        if not len(chosen):
             continue
         size = np.where(within, 1, points.step)
         least = column.min(), row.min()
@@ -103,12 +103,13 @@ def _alone(
 def _damaged(
     shot: Shot, damage: Damage, points: Points, value: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Find the points that the damage has moved or torn away and that the image does not settle.
+    """Find the points inside the damage, except those that the damage target already decides.
+
+    It decides points of visible sheet whose pixels show this damage or undamaged sheet.
 
     Returns:
-        Indices int [D] of these points. Points whose sheet is visible are left out if the image
-        shows there this damage or undamaged sheet. And bool [D]: the point lies in the image, which
-        does not show the damage there.
+        Indices int [D] of these points, and bool [D], True for points in the image whose pixels do
+        not show the damage.
     """
     width = shot.view.size[0]
     place = np.where(points.within, points.row * width + points.column, 0)
@@ -118,12 +119,12 @@ def _damaged(
     known &= (drawn == shot.prepared.numbers.undamaged) | (drawn == value)
     asked = np.flatnonzero(~known)
     rest_mm = points.rest_mm(asked)
-    part = in_hole(damage, rest_mm) | is_marked(damage, rest_mm)
+    damaged = in_hole(damage, rest_mm) | is_marked(damage, rest_mm)
     if form_of(damage).marked is None:
-        rest = np.flatnonzero(~part)
-        moved_mm = np.abs(amount_mm(damage, rest_mm.take(rest, axis=0)))
-        part[rest] = moved_mm > shot.config.damage.mask_threshold_mm
-    found = asked[part]
+        others = np.flatnonzero(~damaged)
+        moved_mm = np.abs(amount_mm(damage, rest_mm.take(others, axis=0)))
+        damaged[others] = moved_mm > shot.config.damage.mask_threshold_mm
+    found = asked[damaged]
     return found, points.within.take(found) & (drawn.take(found) != value)
 
 
