@@ -52,7 +52,7 @@ def sample_contents(
     config: Config,
     kind: str,
     streams: Streams,
-    share: Callable[[Damage], float] = lambda _: 1.0,
+    image_share: Callable[[Damage], float] = lambda _: 1.0,
     color: str | None = None,
 ) -> Contents:
     """Sample a container of a kind with everything on it.
@@ -61,14 +61,14 @@ def sample_contents(
         config: Distribution of scenes.
         kind: Container kind, a key of `KINDS`.
         streams: Function from the name of a property to its independent random generator.
-        share: Function from a damage of this container to the part of an image that it covers, see
-            DamageSight.share.
+        image_share: Function from a damage of this container to the largest part of an image that
+            it covers, see DamageVisibility.image_share.
         color: Name of its paint; None to draw one.
     """
     scale = float(one_of(streams("corrugation"), config.container.depth_scale))
     container = Container(kind, config.container.profiles.deepened(scale))
     surface = _surface(config.surface, streams, color)
-    damages = sample_damages(config.damage, KINDS[kind].size_mm, streams, share)
+    damages = sample_damages(config.damage, KINDS[kind].size_mm, streams, image_share)
     mesh = SHAPES.container(kind, container.profiles)
     sheets = _empty_sheets(container, mesh)
     decals = sample_decals(config.markings, kind, sheets, surface.paint.albedo, streams)

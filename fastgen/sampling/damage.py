@@ -10,8 +10,8 @@ import numpy as np
 
 from fastgen.config.damage import DamageConfig
 from fastgen.damages.draws import FRAME_MM, rounded_vector, turned
-from fastgen.sampling.sight import LEAST_SHARE
 from fastgen.sampling.streams import Streams, one_of
+from fastgen.sampling.visibility_estimates import LEAST_SHARE
 from fastgen.scene import Damage, Vec3
 from fastgen.scene.damage_kinds import Kind, SheetForm, kind_named
 from fastgen.scene.door_gear import damaged_gear
@@ -54,7 +54,7 @@ def sample_damages(
     config: DamageConfig,
     size_mm: Vec3,
     streams: Streams,
-    share: Callable[[Damage], float],
+    image_share: Callable[[Damage], float],
 ) -> tuple[Damage, ...]:
     """Sample the damages of one container.
 
@@ -62,7 +62,8 @@ def sample_damages(
         config: Probabilities and ranges.
         size_mm: Outer length, width and height of the container.
         streams: Function from the name of a property to its independent random generator.
-        share: Function from a damage to the part of an image that it covers, see DamageSight.share.
+        image_share: Function from a damage to the largest part of an image that it covers, see
+            DamageVisibility.image_share.
 
     Returns:
         Damages in the container frame, those of listed_kinds first; an empty tuple for an
@@ -76,7 +77,7 @@ def sample_damages(
         rng = streams(f"damage.{i}")
         aimed = streams(f"damage.{i}.toward").random() < config.toward_cameras
         draw = partial(_drawn, kind, config, size_mm, planes, rng)
-        damage = _best_seen(draw, share) if aimed else draw()
+        damage = _best_seen(draw, image_share) if aimed else draw()
         gear = damaged_gear((*damages, damage))
         if len(gear) > len(set(gear)):
             continue
@@ -91,15 +92,15 @@ def sample_damages(
     return (*damages, *beside)
 
 
-def _best_seen(draw: Callable[[], Damage], share: Callable[[Damage], float]) -> Damage:
+def _best_seen(draw: Callable[[], Damage], image_share: Callable[[Damage], float]) -> Damage:
     """Return the first of _MOST_DRAWS damages that is large enough in an image, or the largest."""
     damage = draw()
-    largest = share(damage)
+    largest = image_share(damage)
     for _ in range(_MOST_DRAWS - 1):
         if largest >= LEAST_SHARE:
             break
         other = draw()
-        covered = share(other)
+        covered = image_share(other)
         if covered > largest:
             damage, largest = other, covered
     return damage

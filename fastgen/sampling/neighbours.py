@@ -14,8 +14,8 @@ from fastgen.config.surroundings import GroundConfig
 from fastgen.errors import ConfigError
 from fastgen.sampling.arrangements import Plan, Site, sample_plan
 from fastgen.sampling.contents import Contents, of_neighbours, sample_contents
-from fastgen.sampling.sight import DamageSight, Sight
 from fastgen.sampling.streams import Streams, one_of, weighted_choice
+from fastgen.sampling.visibility_estimates import BoxVisibility, DamageVisibility
 from fastgen.scene import Camera, Ground, Neighbour, Pose, Prop, Vec3
 from fastgen.scene.boxes import (
     OrientedBox,
@@ -90,7 +90,11 @@ def sample_surroundings(
 
 
 def sample_neighbours(
-    config: Config, sites: Iterable[Site], first: Contents, streams: Streams, sight: DamageSight
+    config: Config,
+    sites: Iterable[Site],
+    first: Contents,
+    streams: Streams,
+    visibility: DamageVisibility,
 ) -> tuple[Neighbour, ...]:
     """Sample the contents of the neighbours at their sites.
 
@@ -99,7 +103,7 @@ def sample_neighbours(
         sites: Kinds and poses of the neighbours.
         first: Contents of the container.
         streams: Function from the name of a property to its independent random generator.
-        sight: The cameras, among the container and the neighbours in the order of their sites.
+        visibility: Estimates for the container and the neighbours in the order of their sites.
     """
     theirs = of_neighbours(config)
 
@@ -107,8 +111,8 @@ def sample_neighbours(
         own = streams_of(site, streams)
         alike = own("same_paint").random() < config.placement.same_paint
         color = first.surface.paint.name if alike else None
-        share = partial(sight.share, body)
-        contents = sample_contents(theirs, site.kind, own, share, color)
+        image_share = partial(visibility.image_share, body)
+        contents = sample_contents(theirs, site.kind, own, image_share, color)
         return Neighbour(site.pose, **contents._asdict())
 
     return tuple(itertools.starmap(neighbour, enumerate(sites, start=1)))
@@ -180,7 +184,7 @@ class _Taken:
         raised = [(_above(camera, plan.ground_mm), box) for camera, box in views]
         self.cameras = tuple(camera for camera, _ in raised)
         self._eyes = [np.array(camera.position_mm) for camera in self.cameras]
-        self._sights = [Sight(box, camera) for camera, box in raised]
+        self._visibilities = [BoxVisibility(box, camera) for camera, box in raised]
 
     def fill(self, plan: Plan) -> None:
         """Take sites until there are as many neighbours as planned."""
@@ -204,12 +208,12 @@ class _Taken:
         away = [away_mm(whole, eye) for eye in self._eyes]
         if min(away) < LEAST_DISTANCE_MM or max(away) > CAMERA_REACH_MM:
             return False
-        hidden = [sight.behind(box) for sight in self._sights]
-        shares = (sight.share(points) for sight, points in zip(self._sights, hidden, strict=True))
+        hidden = [(each, each.behind(box)) for each in self._visibilities]
+        shares = (each.share(points) for each, points in hidden)
         if max(shares, default=0.0) > MOST_HIDDEN or not self._in_order([*self._boxes, box]):
             return False
-        for sight, points in zip(self._sights, hidden, strict=True):
-            sight.hide(points)
+        for each, points in hidden:
+            each.hide(points)
         self._boxes.append(box)
         self._room.append(box)
         self.sites.append(site)

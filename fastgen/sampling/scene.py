@@ -30,8 +30,8 @@ from fastgen.sampling.neighbours import (
     streams_of,
 )
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
-from fastgen.sampling.sight import DamageSight
 from fastgen.sampling.streams import Streams, one_of, stream, weighted_choice
+from fastgen.sampling.visibility_estimates import DamageVisibility
 from fastgen.scene import (
     Camera,
     EnvironmentView,
@@ -75,8 +75,8 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
     cameras = [_camera(name, rig, kind, streams) for name, rig in config.cameras.items()]
     around = sample_surroundings(config, kind, spreader.present, cameras, streams)
     bodies = [(kind, Pose()), *((site.kind, site.pose) for site in around.sites)]
-    sight = DamageSight(around.cameras, bodies)
-    first = sample_contents(config, kind, streams, partial(sight.share, 0))
+    visibility = DamageVisibility(around.cameras, bodies)
+    first = sample_contents(config, kind, streams, partial(visibility.image_share, 0))
     # a spreader of this kind holds one container
     spreader = replace(spreader, present=spreader.present and not around.twins)
     ground = None
@@ -89,7 +89,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
         environment=environment,
         cameras=tuple(_with_sensor(camera, config, moment, streams) for camera in around.cameras),
         spreader=spreader,
-        neighbours=sample_neighbours(config, around.sites, first, streams, sight),
+        neighbours=sample_neighbours(config, around.sites, first, streams, visibility),
         ground=ground,
         props=around.props,
         weather=weather,

@@ -1,4 +1,4 @@
-"""Estimates of what a camera sees of containers among others, and of their damages."""
+"""Estimates of how much of containers and of their damages cameras see past other containers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,10 +24,11 @@ LEAST_SHARE = 1e-3
 Array = NDArray[np.float64]
 
 
-class Sight:
-    """Visible points on a container's outer box, each marked as hidden or not.
+class BoxVisibility:
+    """Points on the sides of a container's outer box that face a camera, each hidden or visible.
 
-    Only points within the image count. The image is taken as square and without distortion.
+    Other containers may hide points. Only points within the image count. The image is taken as
+    square and without distortion.
 
     Args:
         box: The box.
@@ -48,7 +49,7 @@ class Sight:
         return self._hidden | box.between(self._eye, self._points)
 
     def share(self, hidden: NDArray[np.bool_]) -> float:
-        """Return the share of the box's visible part that is hidden, 0 to 1."""
+        """Return the share of the points' solid angle that is hidden, 0 to 1."""
         total = self._sizes.sum()
         return float(self._sizes[hidden].sum() / total) if total else 0.0
 
@@ -57,8 +58,8 @@ class Sight:
         self._hidden = hidden
 
 
-class DamageSight:
-    """Cameras among containers, for the question whether a camera shows a damage.
+class DamageVisibility:
+    """Estimates of the largest part of an image that each damage covers.
 
     Images are taken as square and without distortion. A damage counts as its rectangle, and other
     containers hide it if they hide its middle.
@@ -80,7 +81,7 @@ class DamageSight:
     def _boxes(self) -> list[OrientedBox]:
         return [container_box(kind, pose) for kind, pose in self._bodies]
 
-    def share(self, body: int, damage: Damage) -> float:
+    def image_share(self, body: int, damage: Damage) -> float:
         """Return the largest part of an image that a damage covers.
 
         Only cameras that show it as described at `DamageConfig.toward_cameras` count; 0 if none
