@@ -255,8 +255,8 @@ def main() -> None:
         return
     counts = exactness(options.scenes, options.size)
     ways = against_the_paper(max(options.scenes // 10, 2))
-    asked = {"scenes": options.scenes, "size": options.size}
-    figures = {**origin(), **asked, "views": counts, **ways}
+    settings = {"scenes": options.scenes, "size": options.size}
+    figures = {**origin(), **settings, "views": counts, **ways}
     save("label_accuracy", figures)
     charts.write(draw(figures), options.chart)
 

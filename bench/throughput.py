@@ -292,8 +292,12 @@ def main() -> None:
     driver = ", ".join(sorted({row["driver"] for row in rows}))
     print(f"\n{driver}; N work.: images per second with N workers; steady: last two thirds")
     long = options.long, long_runs(options.long)
-    told = {"images": long[0], "images_per_s": long[1].whole, "steady_images_per_s": long[1].steady}
-    figures = {**origin(), "images": options.images, "rows": rows, "long_runs": told}
+    long_figures = {
+        "images": long[0],
+        "images_per_s": long[1].whole,
+        "steady_images_per_s": long[1].steady,
+    }
+    figures = {**origin(), "images": options.images, "rows": rows, "long_runs": long_figures}
     save("throughput", figures)
     charts.write(draw(figures), options.chart)
     lines = table(rows, about, options.images, long)

@@ -156,7 +156,7 @@ class Trainings:
         return interval(right_a[:seeds] - right_b[:seeds], self.tests[0].scenes)
 
 
-def asked(argv: Sequence[str] | None) -> Work:
+def parsed(argv: Sequence[str] | None) -> Work:
     """Parse the command line."""
     first, _, rest = (__doc__ or "").partition("\n\n")
     parser = argparse.ArgumentParser(
@@ -165,12 +165,12 @@ def asked(argv: Sequence[str] | None) -> Work:
     parser.add_argument("--blender-python", type=Path, help="Python 3.11 with bpy 4.5")
     parser.add_argument("--smoke", action="store_true", help="run only a few steps, as a test")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder for the results")
-    told = parser.parse_args(argv)
-    mode = "smoke" if told.smoke else "cpu"
-    cache = told.results / "cache" / f"fast_or_true_{mode}"
+    options = parser.parse_args(argv)
+    mode = "smoke" if options.smoke else "cpu"
+    cache = options.results / "cache" / f"fast_or_true_{mode}"
     cache.mkdir(parents=True, exist_ok=True)
-    references = told.results / "cache" / "traced"
-    return Work(STUDIES[mode], mode, told.results, cache, references, told.blender_python)
+    references = options.results / "cache" / "traced"
+    return Work(STUDIES[mode], mode, options.results, cache, references, options.blender_python)
 
 
 def rendered(work: Work, generator: Generator) -> dict[str, CropSet]:
@@ -247,9 +247,16 @@ def equal_number(made: Trainings) -> Table:
     for end, scenes in [*(("", n) for n in study.numbers), (LONG, study.train)]:
         a, b = ("ours" + end, scenes), ("traced" + end, scenes)
         images = f"{scenes * VIEWS}{end}"
-        row = [images, len(made.done[a]), told(made.mean(*a)), told(made.mean(*b))]
+        row = [
+            images,
+            len(made.done[a]),
+            with_interval(made.mean(*a)),
+            with_interval(made.mean(*b)),
+        ]
         row += [signed(made.difference(a, b))]
-        rows.append([*row, told(made.mean(*a, "on_ours")), told(made.mean(*b, "on_ours"))])
+        rows.append(
+            [*row, with_interval(made.mean(*a, "on_ours")), with_interval(made.mean(*b, "on_ours"))]
+        )
     heads = [
         "images",
         "seeds",
@@ -275,8 +282,12 @@ def equal_time(made: Trainings, costs: dict[str, float]) -> Table:
         if most == 0:
             continue
         a, b = ("ours" + end, most), ("traced" + end, scenes)
-        row = [f"{scenes * VIEWS}{end}", f"{spent:.0f}", told(made.mean(*b))]
-        row += [str(most * VIEWS), f"{most * VIEWS * costs['ours']:.0f}", told(made.mean(*a))]
+        row = [f"{scenes * VIEWS}{end}", f"{spent:.0f}", with_interval(made.mean(*b))]
+        row += [
+            str(most * VIEWS),
+            f"{most * VIEWS * costs['ours']:.0f}",
+            with_interval(made.mean(*a)),
+        ]
         rows.append([*row, signed(made.difference(a, b))])
     heads = ["Cycles' images", "CPU s", "score", "our images", "CPU s", "score", "difference"]
     return Table("The same rendering time, %", heads, rows)
@@ -289,12 +300,12 @@ def elements_worth(made: Trainings) -> Table:
     for name in made.work.study.elements:
         lacking = f"no {name}", size
         lost = made.difference(("ours", size), lacking)
-        rows.append([name, told(made.mean(*lacking)), signed(lost)])
+        rows.append([name, with_interval(made.mean(*lacking)), signed(lost)])
     title = f"Without an element, {size * VIEWS} of our images, %"
     return Table(title, ["without", "score", "points it is worth"], rows)
 
 
-def told(mean: Mean) -> str:
+def with_interval(mean: Mean) -> str:
     """Format a mean and its interval."""
     return f"{mean.mean:.1f} ({mean.low:.1f} to {mean.high:.1f})"
 
@@ -306,7 +317,7 @@ def signed(mean: Mean) -> str:
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Render, train, and write the results."""
-    work = asked(argv)
+    work = parsed(argv)
     study = work.study
     torch.set_num_threads(1)
     with Generator(CONFIG, SCENE_SEED, SIZE) as generator:

@@ -42,11 +42,11 @@ def world():
 
 def hits(caster, start, toward):
     """Return the first hits of rays on a body and the normals there, [K, 3], NaN for misses."""
-    met = np.full(start.shape, np.nan)
+    places = np.full(start.shape, np.nan)
     normals = np.full(start.shape, np.nan)
     where, ray, triangle = caster.intersects_location(start, toward, multiple_hits=False)
-    met[ray], normals[ray] = where, caster.mesh.face_normals[triangle]
-    return met, normals
+    places[ray], normals[ray] = where, caster.mesh.face_normals[triangle]
+    return places, normals
 
 
 @pytest.fixture(scope="module")
@@ -104,11 +104,11 @@ def by_rays(world, glow, of):
         facing = directions[directions @ spreader.normals[vertex] > 0]
         weight = facing @ spreader.normals[vertex]
         start = np.tile(points[vertex], (len(facing), 1))
-        met = [hits(caster, start, facing) for caster in casters]
-        away = np.array([np.linalg.norm(place - start, axis=1) for place, _ in met])
+        hits_of = [hits(caster, start, facing) for caster in casters]
+        away = np.array([np.linalg.norm(place - start, axis=1) for place, _ in hits_of])
         first = np.where(np.isnan(away), 1e9, away).argmin(axis=0)
         light = np.zeros((len(facing), 3))
-        for number, (place, normal) in enumerate(met):
+        for number, (place, normal) in enumerate(hits_of):
             mine = (first == number) & np.isfinite(away[number])
             light[mine] = glow(number, place[mine], normal[mine])
         found.append(weight @ light / weight.sum())
@@ -163,7 +163,7 @@ def test_light_comes_from_the_face_that_a_ray_hits(world, factors, outside):
     glowing = glow(spreader.positions_mm, spreader.normals)
     dim = 1e-4
     found = factors.light(0 * glowing, glowing, np.zeros((1000, 3)), np.full(glowing.shape, dim))
-    expected = by_rays(world, lambda body, *met: glow(*met) * (body == 1), outside)
+    expected = by_rays(world, lambda body, *hit: glow(*hit) * (body == 1), outside)
     off = np.abs(found[outside] / dim - expected)[:, 0]
     assert expected.mean() > 0.03
     assert off.mean() < 0.04
@@ -326,12 +326,12 @@ def test_a_hit_is_represented_by_the_best_of_all_vertices():
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     shares = rng.dirichlet((1, 1, 1), len(triangle))[..., None]
-    met = (shares * corners[triangle]).sum(axis=1)
-    found = interreflection._representatives(met, normals, triangle, spreader)
-    away = met[:, None] - spreader.positions_mm
+    places = (shares * corners[triangle]).sum(axis=1)
+    found = interreflection._representatives(places, normals, triangle, spreader)
+    away = places[:, None] - spreader.positions_mm
     normal = normals[triangle][:, None]
     turned = 1000 / 2**0.5 * (normal - spreader.normals)
     off = 20 * (away * normal).sum(axis=-1)
     apart = (away**2).sum(axis=-1) + (turned**2).sum(axis=-1) + off**2
-    rows = np.arange(len(met))
+    rows = np.arange(len(places))
     np.testing.assert_allclose(apart[rows, found], apart.min(axis=1), rtol=1e-3, atol=1e-3)

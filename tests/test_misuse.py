@@ -124,9 +124,9 @@ def test_a_refused_device_changes_nothing(copy, tmp_path, capsys):
     assert main(["verify", str(copy), "--repair", "--device-index", "99"]) == 2
     capsys.readouterr()
     assert main(["verify", str(copy)]) == 1
-    told = capsys.readouterr().out
-    assert "s3_000000_A.jpg: missing" in told
-    assert "not finished" not in told
+    report = capsys.readouterr().out
+    assert "s3_000000_A.jpg: missing" in report
+    assert "not finished" not in report
     assert main(["generate", str(tmp_path / "new"), "--images", "2", *more]) == 2
     assert content(tmp_path / "new") == {}
 
@@ -180,15 +180,15 @@ def test_all_changed_settings_are_reported_with_their_options(copy, capsys):
     more += ["--set", "weather={fog_probability: 1, rain_probability: 1, wetness: 0.8}"]
     assert main(["generate", str(copy), *ARGUMENTS, *more, "--size", "80x64"]) == 2
     error = capsys.readouterr().err
-    told = error.partition("(")[2].partition("); to resume, repeat the old ")
-    assert [each.split(" was ")[0] for each in told[0].split("; ")] == [
+    parts = error.partition("(")[2].partition("); to resume, repeat the old ")
+    assert [each.split(" was ")[0] for each in parts[0].split("; ")] == [
         *("formats", "seed", "size", "quality", "shard_scenes"),
         *(f"config.split.{split}" for split in ("test", "train", "val")),
         *("config.weather.fog_probability", "config.weather.rain_probability"),
         "and 1 more",  # config.weather.wetness
     ]
     options = "--tasks, --also, --seed, --size, --quality, --shard, --split, --config, --set"
-    assert told[2].startswith(options)
+    assert parts[2].startswith(options)
 
 
 def test_resuming_another_versions_dataset_names_that_version(copy, monkeypatch, capsys):

@@ -126,10 +126,10 @@ def test_json_and_quiet_leave_one_line_for_other_programs(tmp_path, capfd):
     for seed, out in enumerate(parts):
         command = ["generate", out, "--images", "2", "--seed", str(seed), *SMALL]
         assert main([*command, "--quiet", "--json"]) == 0
-        told = capfd.readouterr()
-        assert told.err == ""
-        assert told.out.count("\n") == 1
-        result = json.loads(told.out)
+        printed = capfd.readouterr()
+        assert printed.err == ""
+        assert printed.out.count("\n") == 1
+        result = json.loads(printed.out)
         manifest = json.loads((tmp_path / out / "dataset.json").read_text())
         assert result == {
             "out": out,

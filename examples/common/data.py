@@ -62,8 +62,8 @@ def rendered(data: ContainerDataset, folder: Path) -> Kept:
     used.
     """
     paired = data.items.pairs
-    told = json.dumps([fastgen.__version__, data.epoch, data.description, paired], sort_keys=True)
-    path = folder / f"{data.task}_{hashlib.sha256(told.encode()).hexdigest()[:12]}.pt"
+    inputs = json.dumps([fastgen.__version__, data.epoch, data.description, paired], sort_keys=True)
+    path = folder / f"{data.task}_{hashlib.sha256(inputs.encode()).hexdigest()[:12]}.pt"
     if path.exists():
         return Kept(torch.load(path, weights_only=True))
     folder.mkdir(parents=True, exist_ok=True)

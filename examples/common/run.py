@@ -115,14 +115,14 @@ def start(
     parser.add_argument("--smoke", action="store_true", help="run only a few steps, as a test")
     parser.add_argument("--seed", type=int, default=1, help="seed of scenes, weights and order")
     parser.add_argument("--results", type=Path, default=RESULTS, help="folder for the results")
-    asked = parser.parse_args(argv)
-    if asked.seed < 0:
-        raise ConfigError(f"seed: {asked.seed} is negative; use 0 or more")
-    mode = "smoke" if asked.smoke else "full" if asked.full else "cpu"
-    torch.manual_seed(asked.seed)
-    asked.results.mkdir(parents=True, exist_ok=True)
+    options = parser.parse_args(argv)
+    if options.seed < 0:
+        raise ConfigError(f"seed: {options.seed} is negative; use 0 or more")
+    mode = "smoke" if options.smoke else "full" if options.full else "cpu"
+    torch.manual_seed(options.seed)
+    options.results.mkdir(parents=True, exist_ok=True)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    return Run(name, mode, plans[mode], asked.full, asked.results, asked.seed, device)
+    return Run(name, mode, plans[mode], options.full, options.results, options.seed, device)
 
 
 def feed_of(

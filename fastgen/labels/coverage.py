@@ -143,7 +143,7 @@ def covered(
     owner: Ints,
     count: int,
     size: tuple[int, int],
-    asked: Box | None = None,
+    clip_box: Box | None = None,
 ) -> Covered:
     """Return the pixels that the union of each owner's polygons covers.
 
@@ -152,7 +152,7 @@ def covered(
         owner: int [K].
         count: Number of owners.
         size: Width and height of the image.
-        asked: Part of the image to return pixels of; by default the whole image.
+        clip_box: Part of the image to return pixels of; by default the whole image.
     """
     width, height = size
     rows = np.ptp(polygons[..., 1]) if polygons.size else 0.0
@@ -165,7 +165,7 @@ def covered(
         whole = _lengths(runs, count)
     within = _inside(runs, (0, 0, width, height))
     beyond = np.maximum(whole - _lengths(within, count), 0)
-    return Covered(within if asked is None else _inside(within, asked), width, beyond)
+    return Covered(within if clip_box is None else _inside(within, clip_box), width, beyond)
 
 
 def _merged(runs: Runs, owner: Ints) -> Runs:

@@ -117,14 +117,14 @@ def _damaged(
     # where the sheet is visible, the damage target has the answer
     known = points.within & (points.depth_m <= depth * (1 + _DEPTH_SLACK))
     known &= (drawn == shot.prepared.numbers.undamaged) | (drawn == value)
-    asked = np.flatnonzero(~known)
-    rest_mm = points.rest_mm(asked)
+    unsettled = np.flatnonzero(~known)
+    rest_mm = points.rest_mm(unsettled)
     damaged = in_hole(damage, rest_mm) | is_marked(damage, rest_mm)
     if form_of(damage).marked is None:
         others = np.flatnonzero(~damaged)
         moved_mm = np.abs(amount_mm(damage, rest_mm.take(others, axis=0)))
         damaged[others] = moved_mm > shot.config.damage.mask_threshold_mm
-    found = asked[damaged]
+    found = unsettled[damaged]
     return found, points.within.take(found) & (drawn.take(found) != value)
 
 
@@ -136,6 +136,6 @@ def _distinct(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> int:
     if not len(columns):
         return 0
     columns, rows = columns - columns.min(), rows - rows.min()
-    met = np.zeros((rows.max() + 1, columns.max() + 1), bool)
-    met[rows, columns] = True
-    return int(np.count_nonzero(met))
+    occupied = np.zeros((rows.max() + 1, columns.max() + 1), bool)
+    occupied[rows, columns] = True
+    return int(np.count_nonzero(occupied))

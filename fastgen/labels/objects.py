@@ -134,9 +134,9 @@ def _decals(shot: Shot) -> list[Object]:
     bounds = float_boxes(boxes(seen.pixels, seen.facets.owner, count))
     # only visible decals need their unoccluded area
     owner = seen.facets.owner.take(seen.facets.corners[:, 0])
-    asked = np.flatnonzero((areas[own - least] > 0)[owner])
-    polygons = seen.pixels.take(seen.facets.corners.take(asked, axis=0), axis=0)
-    alone = covered(polygons, owner[asked], count, view.size)
+    visible = np.flatnonzero((areas[own - least] > 0)[owner])
+    polygons = seen.pixels.take(seen.facets.corners.take(visible, axis=0), axis=0)
+    alone = covered(polygons, owner[visible], count, view.size)
     pixel, whose = alone.pixels()
     lost = whose[frame.ids.ravel().take(pixel) != own.take(whose)]
     hidden = np.bincount(lost, minlength=count).tolist()
@@ -206,9 +206,9 @@ def _container(shot: Shot) -> Object:
         hidden, beyond = _unseen(shot, corners, passes_camera)
     castings, polygon = _castings(shot, corners)
     (amodal_bbox,) = float_boxes(bounds[None])
-    told = visibility(shot.config, shot.view.size, area, hidden, beyond)
+    facts = visibility(shot.config, shot.view.size, area, hidden, beyond)
     if area and ((bounds[:2] < 0).any() or (bounds[2:] > view.size).any()):
-        told["truncated"] = True  # damage bulges out of the box
+        facts["truncated"] = True  # damage bulges out of the box
     return Object(
         id=prepared.numbers.container,
         class_name="container",
@@ -218,7 +218,7 @@ def _container(shot: Shot) -> Object:
         area=area,
         polygon=polygon,
         keypoints=castings,
-        **told,
+        **facts,
     )
 
 
@@ -237,10 +237,10 @@ def _unseen(shot: Shot, corners: NDArray[np.float64], passes_camera: bool) -> tu
     if not passes_camera:  # otherwise the near plane opens the box, and its inner sides are seen
         polygons = polygons[facing(polygons)]
     # void pixels within the box are not hidden; only the spreader and other containers hide any
-    asked = None if shot.hiding is None else mask_box(shot.hiding)
+    hiding_box = None if shot.hiding is None else mask_box(shot.hiding)
     owner = np.zeros(len(polygons), np.int64)
-    alone = covered(polygons, owner, 1, shot.view.size, asked or (0, 0, 0, 0))
-    hidden = 0 if shot.hiding is None or asked is None else int(alone.shown(shot.hiding)[0])
+    alone = covered(polygons, owner, 1, shot.view.size, hiding_box or (0, 0, 0, 0))
+    hidden = 0 if shot.hiding is None or hiding_box is None else int(alone.shown(shot.hiding)[0])
     return hidden, int(alone.beyond[0])
 
 
@@ -294,8 +294,8 @@ def _castings(
     blocking = [] if spreader is None else [spreader.ray_triangles]
     blocking += [] if shot.blocking is None else [RayTriangles(shot.blocking)]
     for each in blocking:
-        asked = np.flatnonzero(faces & inside)
-        faces[asked] = ~each.hide(eye_mm, corners[asked])
+        candidates = np.flatnonzero(faces & inside)
+        faces[candidates] = ~each.hide(eye_mm, corners[candidates])
     found: list[Keypoint] = [
         (round(x, 3), round(y, 3), 2 if face else 1) if within else (0.0, 0.0, 0)
         for (x, y), face, within in zip(

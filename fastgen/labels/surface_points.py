@@ -94,10 +94,10 @@ def _points(seen: Projected, runs: Runs, step: int, size: tuple[int, int]) -> Po
     ends = length.cumsum()
     column = (left - ends + length).repeat(length)
     column += np.arange(len(column))
-    met = np.zeros(len(seen.facets.corners), bool)
-    met[polygon] = True
-    origin, plane = _planes(seen, np.flatnonzero(met))
-    facet = (met.cumsum() - 1)[polygon].repeat(length)
+    hit = np.zeros(len(seen.facets.corners), bool)
+    hit[polygon] = True
+    origin, plane = _planes(seen, np.flatnonzero(hit))
+    facet = (hit.cumsum() - 1)[polygon].repeat(length)
     column, row = column * step, row.repeat(length) * step
     x, y = column + 0.5 * step, row + 0.5 * step
     within = (x >= 0) & (x < size[0]) & (y >= 0) & (y < size[1])

@@ -323,11 +323,11 @@ def _visible_shares(boxes: Sequence[_Placed], points: NDArray[np.float32]) -> ND
         middle, width = at / -ahead, half / np.abs(ahead)
         near = np.maximum((middle - width).max(axis=0), _OUTSIDE_M)
         far = (middle + width).min(axis=0)
-        met = near < far
-        high = np.where(met, box.top**2 / (box.top**2 + near * near), 0.0)
+        hit = near < far
+        high = np.where(hit, box.top**2 / (box.top**2 + near * near), 0.0)
         # the farther edge of the underside has the lower elevation
-        low = np.where(met, box.bottom**2 / (box.bottom**2 + far * far), np.inf)
-        np.subtract(high, low, out=cover, where=met)
+        low = np.where(hit, box.bottom**2 / (box.bottom**2 + far * far), np.inf)
+        np.subtract(high, low, out=cover, where=hit)
         np.minimum(lowest, low, out=lowest)
         np.maximum(highest, high, out=highest)
     together = covers.sum(axis=0)

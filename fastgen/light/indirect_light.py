@@ -228,8 +228,8 @@ def _found(
         on_own = ~on_box & np.isfinite(own_mm)
         own.append(_rows(receiver[on_own], number, before[hit[on_own]]))
         places.append(start[on_own] + own_mm[on_own, None] * ray)
-        met = start[on_box] + box_mm[on_box, None] * ray
-        below.append(_rows(receiver[on_box], number, cell_of(side[on_box], met, box)))
+        hit_mm = start[on_box] + box_mm[on_box, None] * ray
+        below.append(_rows(receiver[on_box], number, cell_of(side[on_box], hit_mm, box)))
     receiver, ray, triangle = np.concatenate(own, axis=1)
     emitter = _representatives(np.concatenate(places), normals, triangle, spreader)
     return {
@@ -238,7 +238,9 @@ def _found(
     }
 
 
-def _representatives(met: Array, normals: Array, triangle: Numbers, spreader: Mesh) -> Numbers:
+def _representatives(
+    positions_mm: Array, normals: Array, triangle: Numbers, spreader: Mesh
+) -> Numbers:
     """Return the vertex [K] that represents each hit: close by, of similar normal, in its plane.
 
     The squared distance is that of the positions, plus that of the normals scaled by _TURNED_MM,
@@ -247,7 +249,7 @@ def _representatives(met: Array, normals: Array, triangle: Numbers, spreader: Me
     nearest vertex.
 
     Args:
-        met: Positions of the hits, [K, 3].
+        positions_mm: Positions of the hits, [K, 3].
         normals: Normals of all triangles, [T, 3].
         triangle: Triangle of each hit, [K].
         spreader: Mesh of the vertices.
@@ -257,13 +259,13 @@ def _representatives(met: Array, normals: Array, triangle: Numbers, spreader: Me
     # rounded, so that coplanar triangles share a tree
     distinct, group = np.unique(normals.round(6), axis=0, return_inverse=True)
     group = group[triangle]
-    found = np.empty(len(met), np.int64)
+    found = np.empty(len(positions_mm), np.int64)
     for i, normal in enumerate(distinct):
         hits = np.flatnonzero(group == i)
         if len(hits):
             tree = cKDTree(_coordinates(spreader.positions_mm, spreader.normals, normal))
             hit_normals = np.broadcast_to(normal, (len(hits), 3))
-            found[hits] = tree.query(_coordinates(met[hits], hit_normals, normal))[1]
+            found[hits] = tree.query(_coordinates(positions_mm[hits], hit_normals, normal))[1]
     return found
 
 

@@ -72,15 +72,15 @@ class Clusters:
             Slices of the far triangles and slices of the near triangles. Together they hold each
             of the given triangles once.
         """
-        met = np.zeros(len(self._low), bool)
+        overlapping = np.zeros(len(self._low), bool)
         for box in boxes_mm:
             low, high = box.min(axis=0) - margin_mm, box.max(axis=0) + margin_mm
-            met |= ((self._low <= high) & (self._high >= low)).all(axis=1)
-        near = np.repeat(met, _SIZE)[: self._count]
-        asked = np.zeros(self._count, bool)
+            overlapping |= ((self._low <= high) & (self._high >= low)).all(axis=1)
+        near = np.repeat(overlapping, _SIZE)[: self._count]
+        chosen = np.zeros(self._count, bool)
         for part in triangles:
-            asked[part] = True
-        return _slices(asked & ~near), _slices(asked & near)
+            chosen[part] = True
+        return _slices(chosen & ~near), _slices(chosen & near)
 
     def _runs(self, shown: NDArray[np.bool_]) -> list[slice]:
         return [

@@ -58,12 +58,12 @@ def scene_bodies(
     """
     members = list(members)
     bodies = [body for each in members for body in _of_member(each, lens)]
-    suns = [
+    lights = [
         DistantLight(
-            to_map_frame(sun.direction, -scene.environment.yaw_deg).astype(np.float32),
-            np.array(sun.light, np.float32),
+            to_map_frame(light.direction, -scene.environment.yaw_deg).astype(np.float32),
+            np.array(light.light, np.float32),
         )
-        for sun in ambient.lights
+        for light in ambient.lights
     ]
     if scene.ground is not None and ground is not None:
         bodies.append(_of_ground(scene.ground, ground))
@@ -72,7 +72,7 @@ def scene_bodies(
         bodies += [
             _of_prop(prop, scene.ground, ground, ambient, yaw_deg, boxes) for prop in scene.props
         ]
-    return RayBodies(bodies, suns)
+    return RayBodies(bodies, lights)
 
 
 def _of_member(one: LitMember, lens: bool) -> list[LitBody]:

@@ -45,7 +45,7 @@ class SceneLights:
         self._light_of = light
         self._traced = quality.traced
         self._lights: ReleasingCache[GpuLight] = ReleasingCache(24)
-        self._sunny: RecentCache[EnvironmentLight] = RecentCache(2)
+        self._clear_environments: RecentCache[EnvironmentLight] = RecentCache(2)
         self._foggy: ReleasingCache[GpuLight] = ReleasingCache(2)
         self._backgrounds = BackgroundTextures(gl)
         self._lit: RecentCache[Ambient] = RecentCache(4)
@@ -59,7 +59,7 @@ class SceneLights:
             return self._clear(name)
 
         def foggy() -> GpuLight:
-            clear = self._sunny.get(name, lambda: self._light_of(name))
+            clear = self._clear_environments.get(name, lambda: self._light_of(name))
             return GpuLight(self._gl, in_fog(clear, visibility_mm), self._traced)
 
         return self._foggy.get((name, visibility_mm), foggy)
