@@ -115,7 +115,7 @@ class Whole:
     Attributes:
         image: sRGB [H, W, 3] in 0..1 at the requested size.
         there: Mask [H, W] of the pixels of objects.
-        around: Window that contains all objects.
+        window: Window that contains all objects.
         error: Mean FLIP to the Cycles image over the objects, at 320x320.
     """
 
@@ -124,7 +124,7 @@ class Whole:
     exposure: float
     image: Array
     there: NDArray[np.bool_]
-    around: tuple[slice, slice]
+    window: tuple[slice, slice]
     error: float
 
     @staticmethod
@@ -133,14 +133,14 @@ class Whole:
         reference = load(case.number)
         frame = full.frame(case, reference.scene, size)
         there = frame.ids > 0
-        around = tuple(
+        window = tuple(
             slice(max(places.min() - MARGIN_PX, 0), places.max() + MARGIN_PX)
             for places in np.nonzero(there)
         )
         exposure = full.exposure(case, reference.scene)
         error = error_to(reference, exposure, full.frame(case, reference.scene, SIZE))
         image = frame.image / 255.0
-        return Whole(case, reference, exposure, image, there, (around[0], around[1]), error)
+        return Whole(case, reference, exposure, image, there, (window[0], window[1]), error)
 
 
 def error_to(reference: Reference, exposure: float, frame: Frame) -> float:
@@ -158,8 +158,8 @@ def without(
         for whole in wholes:
             case, scene = whole.case, whole.reference.scene
             part = less.frame(case, scene, size).image / 255.0
-            error = flip(whole.image[whole.around], part[whole.around])
-            change = error[whole.there[whole.around]]
+            error = flip(whole.image[whole.window], part[whole.window])
+            change = error[whole.there[whole.window]]
             changes.append(float(change.mean()))
             visible.append(float((change > VISIBLE).mean()))
             small = less.frame(case, scene, SIZE)

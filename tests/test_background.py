@@ -22,7 +22,7 @@ from fastgen.errors import AssetError
 from fastgen.formats.format import assemble
 from fastgen.formats.item import Item
 from fastgen.formats.registry import known_formats
-from fastgen.labels.background import SMALL_PX, around
+from fastgen.labels.background import SMALL_PX, panorama_containers
 from fastgen.light.container_map import load_container_map
 from fastgen.light.hdri import bundled_hdris
 from fastgen.resources import asset_path
@@ -112,7 +112,7 @@ def test_each_pixel_shows_the_container_at_its_ray(camera, yaw_deg):
     view = view_of(camera, SIZE)
     numbers = whole_map("port_morning")
     containers = load_container_map(bundled_hdris()["port_morning"])
-    shown = around(view, containers, yaw_deg)[1:-1, 1:-1]
+    shown = panorama_containers(view, containers, yaw_deg)[1:-1, 1:-1]
     column, row = texels(numbers, view, yaw_deg)
     wanted = looked_up(numbers, column, row)
     nearby = [looked_up(numbers, column + x, row + y) for x in (-0.1, 0.1) for y in (-0.1, 0.1)]
@@ -127,8 +127,8 @@ def test_the_border_continues_the_image():
     containers = load_container_map(bundled_hdris()["port_dusk"])
     small, large = view_of(camera, SIZE), view_of(camera, SIZE)
     large = replace(large, size=(SIZE[0] + 2, SIZE[1] + 2))
-    inner = around(large, containers, 20.0)[1:-1, 1:-1]
-    assert (inner != around(small, containers, 20.0)).mean() < 1e-3
+    inner = panorama_containers(large, containers, 20.0)[1:-1, 1:-1]
+    assert (inner != panorama_containers(small, containers, 20.0)).mean() < 1e-3
 
 
 def test_objects_are_the_visible_parts_of_containers(generator):
@@ -177,8 +177,8 @@ def test_turning_environment_and_camera_together_changes_no_label(generator):
     containers = load_container_map(bundled_hdris()["port_golden"])
     camera = replace(CAMERAS[0], position_mm=(0, -9000, 1500))
     turned = replace(camera, position_mm=(9000, 0, 1500))
-    same = around(view_of(camera, SIZE), containers, 15.0)
-    other = around(view_of(turned, SIZE), containers, 105.0)
+    same = panorama_containers(view_of(camera, SIZE), containers, 15.0)
+    other = panorama_containers(view_of(turned, SIZE), containers, 105.0)
     assert same.any()
     assert (same != other).mean() < 1e-3
 
@@ -188,8 +188,8 @@ def test_a_larger_yaw_moves_boxes_by_the_angle_to_the_left(generator):
     camera = replace(CAMERAS[0], target_mm=(0, 0, 1500))
     view = view_of(camera, SIZE)
     containers = load_container_map(bundled_hdris()["port_golden"])
-    before = around(view, containers, 0.0)[1:-1, 1:-1]
-    after = around(view, containers, 5.0)[1:-1, 1:-1]
+    before = panorama_containers(view, containers, 0.0)[1:-1, 1:-1]
+    after = panorama_containers(view, containers, 5.0)[1:-1, 1:-1]
     row = SIZE[1] // 2
     middle = view.center_px[0]
     errors = []
@@ -210,7 +210,7 @@ def test_truncated_containers_go_on_outside_the_image(generator):
     containers = load_container_map(bundled_hdris()["port_morning"])
     wide = replace(sample.view, size=(5 * SIZE[0], 5 * SIZE[1]))
     # the larger image has its principal point in its own middle
-    outside = around(wide, containers, 40.0)[1:-1, 1:-1].copy()
+    outside = panorama_containers(wide, containers, 40.0)[1:-1, 1:-1].copy()
     outside[2 * SIZE[1] : 3 * SIZE[1], 2 * SIZE[0] : 3 * SIZE[0]] = 0
     cut = 0
     for thing in sample.objects:
@@ -220,7 +220,7 @@ def test_truncated_containers_go_on_outside_the_image(generator):
         beyond = int((outside == number).sum())
         assert thing.truncated == (beyond > 0) or beyond < 3
         if beyond > 100:
-            inside = around(sample.view, containers, 40.0)[1:-1, 1:-1] == number
+            inside = panorama_containers(sample.view, containers, 40.0)[1:-1, 1:-1] == number
             share = thing.area / (inside.sum() + beyond)
             assert abs(thing.visible_fraction - share) < 0.2
             cut += 1
@@ -348,6 +348,6 @@ def test_cameras_of_all_pitches_and_sizes_see_what_the_map_has_along_their_rays(
             rise = 10000.0 * np.tan(np.deg2rad(pitch))
             camera = Camera("c", (0, -9000, 1500), (3000, 1000, 1500 + float(rise)), 24.0)
             view = view_of(camera, size)
-            found = around(view, containers, 25.0)[1:-1, 1:-1]
+            found = panorama_containers(view, containers, 25.0)[1:-1, 1:-1]
             wanted = looked_up(numbers, *texels(numbers, view, 25.0))
             assert (found != wanted).mean() < 0.02

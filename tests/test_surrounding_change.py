@@ -26,7 +26,7 @@ def test_encoded_light_of_surroundings_is_the_light_itself(color, added):
     bits = np.packbits(open_to, axis=1)
     visibility = SkyVisibility.of(mesh.normals, bits, encoded_cones(mesh.normals, open_to))
     values, _, light = visibility.lit(sky)
-    around = SurroundingLight(
+    change = SurroundingLight(
         sky=np.full((points, 3), 0.7, np.float32),
         added=np.tile(np.array([1.0, 0.5, 0.25], np.float32) * np.float32(added), (points, 1)),
         lower=np.zeros((6, 3), np.float32),
@@ -34,8 +34,8 @@ def test_encoded_light_of_surroundings_is_the_light_itself(color, added):
         ground=None,
         faces=np.zeros((6, 3), np.float32),
     )
-    found = around.applied(visibility, sky, values, light, mesh)
-    expected = around.vertex_light(values, light, mesh)
+    found = change.applied(visibility, sky, values, light, mesh)
+    expected = change.vertex_light(values, light, mesh)
     cones = (found[:, :3].astype(float) - 128) / 127
     bent = cones / np.linalg.norm(cones, axis=1, keepdims=True)
     whole = sky_irradiance(sky.light, bent.astype(np.float32), sky.yaw_deg)

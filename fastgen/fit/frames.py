@@ -129,8 +129,8 @@ def _linear_frame(generator: Generator, scene: Scene, camera: Camera, light: str
     with generator.gpu.drawing() as renderer:
         frame = renderer.render(PreparedScene(scene), camera, generator.size, radiance=True)
         exposure = renderer.exposure(scene, camera, generator.size)
-        around = renderer.ambient(scene)
-        air = airlight(around, scene.environment.yaw_deg, exposure.factor)
+        ambient = renderer.ambient(scene)
+        air = airlight(ambient, scene.environment.yaw_deg, exposure.factor)
     assert frame.radiance is not None
     moment = sample_moment(
         config.sensor.stamp.years,

@@ -44,7 +44,7 @@ def background_objects(
         `containers.count` are those of the map; groups have larger ones, in no particular order.
     """
     frame = shot.frame
-    shown = around(shot.view, containers, shot.scene.environment.yaw_deg)
+    shown = panorama_containers(shot.view, containers, shot.scene.environment.yaw_deg)
     inside = shown[1:-1, 1:-1]
     free = (frame.ids == 0) & (frame.damage == 0) & np.isinf(frame.depth)
     seen = inside * free
@@ -95,7 +95,7 @@ def background_masks(sample: Sample) -> Iterator[tuple[Object, Box, NDArray[np.b
             yield thing, thing.bbox, part
 
 
-def around(view: View, containers: ContainerMap, yaw_deg: float) -> NDArray[np.uint16]:
+def panorama_containers(view: View, containers: ContainerMap, yaw_deg: float) -> NDArray[np.uint16]:
     """Return the number of the panorama's container along the ray of each pixel centre.
 
     Args:

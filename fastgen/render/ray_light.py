@@ -15,7 +15,7 @@ from fastgen.render.passes.ray_points import RayPass
 from fastgen.render.program import Programs
 from fastgen.render.recent_cache import RecentCache, ReleasingCache
 from fastgen.render.scene_bodies import LitMember, scene_bodies
-from fastgen.render.scene_lights import Around
+from fastgen.render.scene_lights import LightChanges
 from fastgen.render.scene_resources import SceneResources
 from fastgen.render.shapes import Shapes
 from fastgen.scene import Scene
@@ -54,7 +54,7 @@ class RayLight:
         member: Member,
         whole: PreparedScene,
         shapes: Shapes,
-        around: Around | None,
+        light_changes: LightChanges | None,
         ground: GroundLight | None,
         sky: SkyRays,
     ) -> None:
@@ -65,7 +65,7 @@ class RayLight:
             member: The container that is drawn.
             whole: Its scene.
             shapes: Returns the light at vertices.
-            around: What surroundings change in the light on each container, if there are any.
+            light_changes: Change of the light on each container; None without surroundings.
             ground: Light on the ground, if there is one.
             sky: The environment as directions of its light.
         """
@@ -76,7 +76,8 @@ class RayLight:
             prepared, materials = each.prepared, self._resources(each.prepared).materials
             light = shapes.light(prepared, materials, lens, self._ambient(prepared.scene))
             paints = np.array(materials.reflectances, np.float32)
-            return LitMember(each, paints, light, None if around is None else around[prepared])
+            light_change = None if light_changes is None else light_changes[prepared]
+            return LitMember(each, paints, light, light_change)
 
         def found() -> RayBodies:
             ambient = self._ambient(scene)

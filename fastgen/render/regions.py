@@ -140,7 +140,7 @@ def grown(region: Region, margin_px: int, size: tuple[int, int]) -> Region:
     return inside
 
 
-def around(regions: Sequence[Region]) -> Region:
+def bounding_region(regions: Sequence[Region]) -> Region:
     """Return the smallest region that contains all given regions, at least one."""
     left, top = (min(region[k] for region in regions) for k in (0, 1))
     right, bottom = (max(region[k] + region[k + 2] for region in regions) for k in (0, 1))

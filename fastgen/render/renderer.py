@@ -44,7 +44,7 @@ from fastgen.render.program import Programs, Read, shader_text
 from fastgen.render.ray_light import RayLight
 from fastgen.render.recent_targets import RecentTargets
 from fastgen.render.regions import grown
-from fastgen.render.scene_lights import Around, SceneLights
+from fastgen.render.scene_lights import LightChanges, SceneLights
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes
@@ -99,7 +99,7 @@ class Renderer:
         self._kinds = program_kinds(damage.kinds)
         self._geometry = GeometryPass(self.ctx, programs, self._kinds)
         self._background = BackgroundPass(self.ctx, programs, by_compute=not gl.software)
-        self._ground = GroundPass(self.ctx, programs, self.ambient, self._around)
+        self._ground = GroundPass(self.ctx, programs, self.ambient, self._light_changes)
         self._shading = ShadingPass(self.ctx, programs)
         self._normals = NormalsPass(self.ctx, programs)
         self._materials = MaterialTextures(gl, own)
@@ -175,13 +175,13 @@ class Renderer:
         exposure = self._lights.exposure(scene, image.camera, view).factor
         several = bool(scene.neighbours or scene.ground)
         options = DrawOptions(image.layer, image.radiance, over=several)
-        around = self._around(prepared) if several else None
-        inputs = self._inputs(prepared, view, options, around)
+        light_changes = self._light_changes(prepared) if several else None
+        inputs = self._inputs(prepared, view, options, light_changes)
         first = prepared.members[0]
         self._light(inputs, first, prepared, exposure)
         if not several:
             self._geometry.run(inputs)
-            self._trace(inputs, first, prepared, around)
+            self._trace(inputs, first, prepared, light_changes)
             self._background.run(inputs)
             self._shade(inputs, first, exposure, normals)
             return inputs.targets
@@ -192,20 +192,20 @@ class Renderer:
         tiles = Tiles(view) if plan is None else plan.tiles
         for member, part in visible_members(prepared.present, view, tiles):
             own = view.in_frame(member.pose)
-            inputs = self._inputs(member.prepared, own, options, around)
+            inputs = self._inputs(member.prepared, own, options, light_changes)
             if inputs.variant.traced:  # ray points beside a region light pixels in it
                 part = grown(part, points_reach_px(view.size), view.size)
             inputs = replace(inputs, regions=inputs.regions.within(part))
             if inputs.regions.surfaces:
                 self._light(inputs, member, prepared, exposure)
                 self._geometry.run(inputs)
-                self._trace(inputs, member, prepared, around)
+                self._trace(inputs, member, prepared, light_changes)
                 self._shade(inputs, member, exposure, normals)
         return inputs.targets
 
-    def _around(self, prepared: PreparedScene) -> Around:
+    def _light_changes(self, prepared: PreparedScene) -> LightChanges:
         """Return what surroundings change in the light on each container that a scene shows."""
-        return self._lights.around(prepared, self._materials.resources)
+        return self._lights.light_changes(prepared, self._materials.resources)
 
     def _compile_for(self, prepared: PreparedScene) -> None:
         """Compile programs for kinds of damage that the current programs cannot draw."""
@@ -248,7 +248,7 @@ class Renderer:
         prepared: PreparedScene,
         view: View,
         options: DrawOptions,
-        around: Around | None = None,
+        light_changes: LightChanges | None = None,
     ) -> DrawInputs:
         """Collect what the passes share, and fill the uniform blocks of scene and damages."""
         scene, size, lens = prepared.scene, view.size, view.distortion is not None
@@ -258,13 +258,13 @@ class Renderer:
         samples = self._targets.samples(size, per_axis)
         light, ambient = self._lights.of(scene), self.ambient(scene)
         resources = self._materials.resources(prepared)
-        near = None if around is None else around.get(prepared)
+        light_change = None if light_changes is None else light_changes.get(prepared)
         container, spreader, below = self._shapes.of(
-            prepared, resources.materials, lens, ambient, near
+            prepared, resources.materials, lens, ambient, light_change
         )
         seals = self._shapes.seals(prepared, below)
         decals = resources.decals(scale_for(prepared.container, view))
-        ground = None if near is None else near.ground
+        ground = None if light_change is None else light_change.ground
         self._blocks.scene(prepared, decals, len(light.background), ground)
         if damage != "undamaged":
             self._blocks.damages(prepared, damages, self._kinds, samples.inner_row)
@@ -320,13 +320,19 @@ class Renderer:
         self._blocks.view(inputs, scene, exposure)
 
     def _trace(
-        self, inputs: DrawInputs, member: Member, whole: PreparedScene, around: Around | None
+        self,
+        inputs: DrawInputs,
+        member: Member,
+        whole: PreparedScene,
+        light_changes: LightChanges | None,
     ) -> None:
         """Light the visible surfaces by rays, if the quality asks for it."""
         sky = self._lights.of(whole.scene).sky_rays
         if not inputs.variant.traced or sky is None or not inputs.regions.surfaces:
             return
-        self._rays.run(inputs, member, whole, self._shapes, around, self._ground.light(whole), sky)
+        self._rays.run(
+            inputs, member, whole, self._shapes, light_changes, self._ground.light(whole), sky
+        )
 
     def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
         """Prepare the shapes of a scene, so that drawing them takes no more time or memory.

@@ -28,13 +28,13 @@ class LitMember(NamedTuple):
         member: The container.
         paints: Diffuse reflectance [M, 3] of each of mesh.MATERIALS.
         lit: Light in the open at the vertices of the container, and of its spreader if it has one.
-        around: What other containers and the ground change in the light on the container.
+        light_change: What other containers and the ground change in the light on the container.
     """
 
     member: Member
     paints: NDArray[np.float32]
     lit: tuple[LitMesh, ...]
-    around: SurroundingLight | None
+    light_change: SurroundingLight | None
 
 
 def scene_bodies(
@@ -87,8 +87,8 @@ def _of_member(one: LitMember, lens: bool) -> list[LitBody]:
         light = lit.without_lights
         if number == 0:
             place = deform(damages, place) if damages else place
-            if one.around is not None:
-                light = one.around.vertex_light(lit.values, light, mesh)
+            if one.light_change is not None:
+                light = one.light_change.vertex_light(lit.values, light, mesh)
         bodies.append(
             LitBody(
                 (place @ turn.T + origin).astype(np.float32),
@@ -148,13 +148,13 @@ def _of_prop(
     corners = solid.corners * np.array(prop.size_mm) / 2
     place = corners @ turn.T + np.array(prop.pose.position_mm)
     normals = solid.normals @ turn.T
-    around = light.at(place[:, :2] * MM + prop_light.AMBIENT_BESIDE_M * normals[:, :2])
+    ground_texels = light.at(place[:, :2] * MM + prop_light.AMBIENT_BESIDE_M * normals[:, :2])
     up = 0.5 + 0.5 * normals[:, 2:]
     beside = place + prop_light.SUNLIT_BESIDE_M / MM * normals
     beside[:, 2] = ground.height_mm
     level = np.broadcast_to((0.0, 0.0, 1.0), beside.shape)
-    from_ground = around[:, :3] + directional_light(beside, level, boxes, ambient, yaw_deg)
-    from_sky = around[:, 3:] * sky_irradiance(ambient, normals + (0.0, 0.0, 0.5), yaw_deg)
+    from_ground = ground_texels[:, :3] + directional_light(beside, level, boxes, ambient, yaw_deg)
+    from_sky = ground_texels[:, 3:] * sky_irradiance(ambient, normals + (0.0, 0.0, 0.5), yaw_deg)
     found = up * from_sky + (1 - up) * np.array(mean_albedo(ground)) * from_ground
     raised = np.clip((place[:, 2:] - ground.height_mm) * MM / prop_light.OPEN_M, 0.0, 1.0)
     lowest = prop_light.LOWEST_SHARE

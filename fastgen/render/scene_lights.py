@@ -22,7 +22,7 @@ from fastgen.render.settings import Quality
 from fastgen.render.shadows import Shadows
 from fastgen.scene import Camera, EnvironmentView, Scene
 
-Around = Mapping[PreparedScene, SurroundingLight]
+LightChanges = Mapping[PreparedScene, SurroundingLight]
 """Change of the light on each container that a scene shows."""
 
 
@@ -49,7 +49,7 @@ class SceneLights:
         self._foggy: ReleasingCache[GpuLight] = ReleasingCache(2)
         self._backgrounds = BackgroundTextures(gl)
         self._lit: RecentCache[Ambient] = RecentCache(4)
-        self._around: RecentCache[Around] = RecentCache(2)
+        self._light_changes: RecentCache[LightChanges] = RecentCache(2)
         self.shadows = Shadows(gl.ctx, quality.shadow_detail)
 
     def of(self, scene: Scene) -> GpuLight:
@@ -93,9 +93,9 @@ class SceneLights:
         ground = mean_albedo(scene.ground) if scene.ground else None
         return metered_exposure(light, cd_m2, environment.yaw_deg, view, camera, paint, ground)
 
-    def around(
+    def light_changes(
         self, prepared: PreparedScene, resources: Callable[[PreparedScene], SceneResources]
-    ) -> Around:
+    ) -> LightChanges:
         """Return what other containers and the ground change in the light of each container.
 
         Args:
@@ -103,7 +103,7 @@ class SceneLights:
             resources: Returns what the renderer keeps for each container.
         """
 
-        def found() -> Around:
+        def found() -> LightChanges:
             scene, members, ground = prepared.scene, prepared.present, prepared.scene.ground
             changes = surrounding_light(
                 [each.box for each in members],
@@ -115,7 +115,7 @@ class SceneLights:
             )
             return {each.prepared: one for each, one in zip(members, changes, strict=True)}
 
-        return self._around.get(prepared, found)
+        return self._light_changes.get(prepared, found)
 
     def release(self) -> None:
         """Free all GL objects."""

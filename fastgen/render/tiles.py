@@ -122,7 +122,7 @@ class Tiles:
         distance = np.stack([normal_x, normal_y], 1) @ corners.reshape(-1, 2).T - offset[:, None]
         return np.asarray(distance.reshape(-1, *corners.shape[:2]), np.float64)
 
-    def around(self, mask: Mask) -> Region:
+    def bounding_region(self, mask: Mask) -> Region:
         """Return the smallest region that contains a set of tiles, at least one."""
         rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
         left, right = self.columns_px[[columns[0], columns[-1] + 1]].tolist()

@@ -55,7 +55,7 @@ def visible_members(
         if member.prepared.spreader is not None:  # it may be visible above its container
             shown[:] = True
         if shown.any():
-            found.append((member, tiles.around(shown)))
+            found.append((member, tiles.bounding_region(shown)))
             hidden |= filled[number]
     return found[::-1]
 

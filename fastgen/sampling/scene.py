@@ -73,32 +73,38 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
     )
     moment = sample_moment(config.sensor.stamp.years, hours_of(environment.name), streams("moment"))
     cameras = [_camera(name, rig, kind, streams) for name, rig in config.cameras.items()]
-    around = sample_surroundings(config, kind, spreader.present, cameras, streams)
-    bodies = [(kind, Pose()), *((site.kind, site.pose) for site in around.sites)]
-    visibility = DamageVisibility(around.cameras, bodies)
+    surroundings = sample_surroundings(config, kind, spreader.present, cameras, streams)
+    bodies = [(kind, Pose()), *((site.kind, site.pose) for site in surroundings.sites)]
+    visibility = DamageVisibility(surroundings.cameras, bodies)
     first = sample_contents(config, kind, streams, partial(visibility.image_share, 0))
     # a spreader of this kind holds one container
-    spreader = replace(spreader, present=spreader.present and not around.twins)
+    spreader = replace(spreader, present=spreader.present and not surroundings.twins)
     ground = None
-    if around.ground_mm is not None:
-        ground = sample_ground(config.ground, around.ground_mm, weather.wetness, streams)
+    if surroundings.ground_mm is not None:
+        ground = sample_ground(config.ground, surroundings.ground_mm, weather.wetness, streams)
     scene = Scene(
         seed=seed,
         index=index,
         **first._asdict(),
         environment=environment,
-        cameras=tuple(_with_sensor(camera, config, moment, streams) for camera in around.cameras),
+        cameras=tuple(
+            _with_sensor(camera, config, moment, streams) for camera in surroundings.cameras
+        ),
         spreader=spreader,
-        neighbours=sample_neighbours(config, around.sites, first, streams, visibility),
+        neighbours=sample_neighbours(config, surroundings.sites, first, streams, visibility),
         ground=ground,
-        props=around.props,
+        props=surroundings.props,
         weather=weather,
     )
     absent = streams("absent").random() < config.container.absent
-    return without_container(scene) if absent else _distinguishable(config, scene, around, streams)
+    if absent:
+        return without_container(scene)
+    return _distinguishable(config, scene, surroundings, streams)
 
 
-def _distinguishable(config: Config, scene: Scene, around: Surroundings, streams: Streams) -> Scene:
+def _distinguishable(
+    config: Config, scene: Scene, surroundings: Surroundings, streams: Streams
+) -> Scene:
     """Return a scene without the damages that masks could not distinguish."""
     carried = [scene.damages, *(each.damages for each in scene.neighbours)]
     counts = Counter(damage.kind for damages in carried for damage in damages)
@@ -106,7 +112,7 @@ def _distinguishable(config: Config, scene: Scene, around: Surroundings, streams
         return scene
     theirs = of_neighbours(config).damage
     drawn = [(config.damage, streams)]
-    drawn += [(theirs, streams_of(site, streams)) for site in around.sites]
+    drawn += [(theirs, streams_of(site, streams)) for site in surroundings.sites]
     listed = [len(listed_kinds(damage, own)) for damage, own in drawn]
     first, *others = within_limit(carried, listed)
     neighbours = zip(scene.neighbours, others, strict=True)

@@ -9,7 +9,7 @@ from fastgen.light.sky_visibility import lobe_masks
 from fastgen.render.constants import LOBE_CELLS, REACH_MARGIN_MM
 from fastgen.render.draw_inputs import DrawInputs
 from fastgen.render.program import Programs, ShaderProgram
-from fastgen.render.regions import around, within
+from fastgen.render.regions import bounding_region, within
 from fastgen.render.variant import DAMAGE_VARIANTS, ShaderVariant
 from fastgen.scene.damage_kinds import form_of
 
@@ -89,7 +89,7 @@ class GeometryPass:
         regions = within(inputs.regions.surfaces, (0, 0, *inputs.targets.size))
         assert spreader is not None, "only scenes with a spreader have regions of cables"
         samples.begin("undamaged", regions, over=inputs.variant.over)
-        whole = around(regions)
+        whole = bounding_region(regions)
         samples.limit(whole)
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._ctx.front_face = "cw"

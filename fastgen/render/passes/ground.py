@@ -21,7 +21,7 @@ from fastgen.render.ground_values import ground_values
 from fastgen.render.passes.bake import Atlas, bake_ground
 from fastgen.render.program import Programs, Textures
 from fastgen.render.recent_cache import ReleasingCache
-from fastgen.render.scene_lights import Around
+from fastgen.render.scene_lights import LightChanges
 from fastgen.render.textures import data_texture
 from fastgen.render.tiles import Mask
 from fastgen.render.variant import GroundVariant, ShaderVariant
@@ -44,7 +44,7 @@ class GroundPass:
         ctx: moderngl.Context,
         programs: Programs,
         ambient: Callable[[Scene], Ambient],
-        around: Callable[[PreparedScene], Around],
+        light_changes: Callable[[PreparedScene], LightChanges],
     ) -> None:
         """Prepare the pass.
 
@@ -52,12 +52,12 @@ class GroundPass:
             ctx: Current context.
             programs: Programs of the renderer.
             ambient: Returns the light of a scene, such as `Renderer.ambient`.
-            around: Returns what surroundings change in the light on each container of a scene.
+            light_changes: Returns the change of the light on each container that a scene shows.
         """
         self._ctx = ctx
         self._programs = programs
         self._ambient = ambient
-        self._around = around
+        self._light_changes = light_changes
         self._block = ctx.buffer(reserve=GROUND_BLOCK.size)
         self._scenes: ReleasingCache[_SceneLight] = ReleasingCache(2)
         self._coarse: ReleasingCache[_CoarseTarget] = ReleasingCache(2)
@@ -127,14 +127,14 @@ class GroundPass:
         scene, present = prepared.scene, prepared.present
         ground = scene.ground
         assert ground is not None
-        around = self._around(prepared)
+        light_changes = self._light_changes(prepared)
         return self._scenes.get(
             prepared,
             lambda: _SceneLight(
                 self._ctx,
                 ground_light(
                     [member.box for member in present],
-                    [around[member.prepared].faces[:4] for member in present],
+                    [light_changes[member.prepared].faces[:4] for member in present],
                     self._ambient(scene),
                     scene.environment.yaw_deg,
                     ground.height_mm,
