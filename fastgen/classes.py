@@ -102,7 +102,7 @@ def is_detection(name: str) -> bool:
 
 
 CONTAINER_ID = 1
-"""Id of the container. In the id target 0 is the surroundings, and decals count up from 2."""
+"""Id of the container. In the id target, 0 is ground, props and panorama; decals start at 2."""
 
 SPREADER_ID = 60000
 """Id of the spreader, above those of all decals."""
@@ -111,4 +111,4 @@ SEAL_ID = 60001
 """Id of a seal on the first hasp; those on the other hasps follow."""
 
 BACKGROUND_ID = 100000
-"""Ids of containers in the surroundings start above it. They are not in the id target."""
+"""Ids of background containers start above it. They are not in the id target."""

@@ -50,7 +50,7 @@ class Drawn(Protocol):
     def background(self) -> bool: ...
 
 
-_SURROUNDINGS = (150, 150, 150)
+_BACKGROUND_COLOR = (150, 150, 150)
 _LINE_PX = 1000
 """Image side in pixels for each pixel of line width."""
 
@@ -295,7 +295,7 @@ def overlay(image: Image, damage: NDArray[np.uint16], objects: Sequence[Drawn]) 
     for item in objects:
         if item.bbox is not None and item.background:
             x0, y0, x1, y1 = item.bbox
-            cv2.rectangle(drawn, (x0, y0), (x1 - 1, y1 - 1), _SURROUNDINGS, 1)
+            cv2.rectangle(drawn, (x0, y0), (x1 - 1, y1 - 1), _BACKGROUND_COLOR, 1)
     outlines = [
         Outline.of_box(item.bbox, item.class_name, f"{item.class_name} {item.instance}")
         for item in objects

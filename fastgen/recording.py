@@ -30,7 +30,7 @@ def export_rerun(
     """Write `scene` as an .rrd file, which `rerun FILE.rrd` shows.
 
     The meshes are at world/scene/NAME. Each camera is at world/cameras/NAME, with its image, depth
-    in metres (0 for the surroundings) and boxes of visible objects below.
+    in metres (0 for the panorama) and boxes of visible objects below.
 
     Args:
         generator: Renders the images and bakes the textures.

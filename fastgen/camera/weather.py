@@ -12,7 +12,7 @@ CONTRAST = 3.912
 """-ln 0.02: at the visibility distance 2 % of a contrast remains (Koschmieder 1924)."""
 
 BACKDROP_M = 300.0
-"""Assumed distance of the surroundings, which an HDRI does not contain."""
+"""Assumed distance of the panorama, because an HDRI has no distances."""
 
 _BESIDE = 2
 """Radius in pixels of the search for uncovered neighbours."""
@@ -39,16 +39,16 @@ def add_fog(
 ) -> Light:
     """Return light seen through fog, by Koschmieder's law: L t + A (1 - t), t = exp(-3.912 d / V).
 
-    In partly covered pixels the object and the surroundings are attenuated separately.
+    In partly covered pixels the object and the panorama are attenuated separately.
 
     Args:
         light: float32 [H, W, 3], linear.
         ray_m: float32 [H, W], distance along the ray of each pixel centre in metres, inf for the
-            surroundings.
+            panorama.
         cover: uint8 [H, W], see Frame.
         visibility_mm: Meteorological visibility V.
         airlight: float32 [3], A.
-        backdrop_m: Distance of the surroundings along the ray in metres, one or float32 [H, W].
+        backdrop_m: Distance of the panorama along the ray in metres, one or float32 [H, W].
     """
     decay = np.float32(-CONTRAST * 1e3 / visibility_mm)
     far = np.broadcast_to(np.exp(decay * np.float32(backdrop_m)), ray_m.shape)
@@ -73,11 +73,11 @@ def _behind(
     mixed: tuple[NDArray[np.intp], ...],
     share: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Return the surroundings' part of the light of partly covered pixels, [N, 3].
+    """Return the panorama's part of the light of partly covered pixels, [N, 3].
 
     The uncovered neighbours give the estimate. It is raised so that the object in the pixel is not
     brighter than the fully covered neighbours, or than the mean fully covered pixel if there are
-    none, as beside cables. This keeps bright detail of the surroundings out of the object.
+    none, as beside cables. This keeps bright detail of the panorama out of the object.
 
     Args:
         light: float32 [H, W, 3].
@@ -104,7 +104,7 @@ def _behind(
 def _objects_m(ray_m: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the distance of the object that covers a pixel, [H, W].
 
-    If the pixel centre shows the surroundings, the nearest neighbour's distance is used. A cable
+    If the pixel centre shows the panorama, the nearest neighbour's distance is used. A cable
     may miss all pixel centres; it gets the smallest distance in the image.
     """
     beside = cv2.erode(ray_m, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)

@@ -72,8 +72,8 @@ class _Damage(Format):
             for value, box, mask, ignored in found
             if not ignored
         ]
-        surroundings = background_masks(item.sample)
-        outlined += [(1, box, part) for thing, box, part in surroundings if not thing.ignored]
+        background = background_masks(item.sample)
+        outlined += [(1, box, part) for thing, box, part in background if not thing.ignored]
         lines = []
         for category, box, part in outlined:
             polygon = yolo.outline(part)

@@ -1,4 +1,4 @@
-"""Labels of the containers in the surroundings, looked up in the panorama's container map."""
+"""Labels of the background containers, which only the panorama shows."""
 
 from collections.abc import Iterator
 
@@ -84,7 +84,7 @@ def background_objects(
 
 
 def background_masks(sample: Sample) -> Iterator[tuple[Object, Box, NDArray[np.bool_]]]:
-    """Yield each labelled container of the surroundings with its visible pixels.
+    """Yield each labelled container of the panorama with its visible pixels.
 
     Yields:
         The object, its box, and the mask bool [h, w] of its pixels in the box.

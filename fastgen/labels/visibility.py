@@ -83,7 +83,7 @@ class Shot:
     @cached_property
     def container_box(self) -> Box | None:
         """Tight box of the container with its decals and damages."""
-        # the ids have no container where two aligned holes show the surroundings
+        # the ids have no container where two aligned holes show what is behind it
         return mask_box(self.frame.damage > 0)
 
     def boxes_on_container(

@@ -85,7 +85,7 @@ class CudaFrame:
     Attributes:
         image: uint8 [H, W, 4], sRGB and Frame.cover.
         labels: uint32 [H, W], id | damage << 16, see Frame.
-        depth: float32 [H, W], metres along the optical axis, inf for the surroundings.
+        depth: float32 [H, W], metres along the optical axis, inf for the panorama.
         scene: The scene.
         camera: The camera.
         view: Projection of the camera.

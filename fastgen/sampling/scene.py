@@ -124,7 +124,7 @@ def _distinguishable(
 
 
 def without_container(scene: Scene) -> Scene:
-    """Return a scene that shows only the surroundings of `scene`: the HDRI and the ground."""
+    """Return a scene that shows only the panorama and the ground of `scene`."""
     return replace(
         scene,
         container=replace(scene.container, present=False),

@@ -67,7 +67,7 @@ def pixel_values(sample: Sample) -> bytes:
 
     Returns:
         Little-endian arrays [H, W] one after another: uint16 ids, uint16 damage, uint16 number of
-        the panorama's container (0 for none), float32 depth in metres (infinite for surroundings).
+        the panorama's container (0 for none), float32 depth in metres (infinite for panorama).
     """
     background = np.zeros_like(sample.ids) if sample.background is None else sample.background
     labels = (sample.ids, sample.damage, background)
