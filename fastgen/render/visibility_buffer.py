@@ -85,7 +85,13 @@ class VisibilityBuffer:
             "sky_visibility_cones",
             "sky_visibility_light",
         )
-        usual = (self._keys, self._points, self._depths, self._visibility, self._light)
+        usual = (
+            self._surface_ids,
+            self._atlas_positions,
+            self._depths,
+            self._visibility,
+            self._light,
+        )
         rest = zip(("rest_x", "rest_y", "rest_z"), self._rest, strict=False)
         return {**dict(zip(names, usual, strict=True)), **dict(rest)}
 
@@ -109,7 +115,7 @@ class VisibilityBuffer:
         boxes = [*map(self._texels, seen), *map(self._texels_inside, holes)]
         self._make_room(damage, max((top + height for _, top, _, height in boxes), default=1))
         for box in boxes:
-            self._clear(self._keys, box, NUMBERS, 0)
+            self._clear(self._surface_ids, box, NUMBERS, 0)
         # with single samples the depth separates sky from surfaces, see ImageTargets.begin
         outer = [None] if self.per_axis == 1 and not over else seen
         for box in (*map(self._texels, outer), *map(self._texels_inside, holes)):
@@ -137,10 +143,10 @@ class VisibilityBuffer:
         if rows > self._rows:
             self.release()
             self._rows = rows
-            self._keys = self._texture(1, "u4")
+            self._surface_ids = self._texture(1, "u4")
             # llvmpipe takes three times as long for four numbers a texel as for four textures of
             # one, and twice as long for bytes as for a number that holds four of them
-            self._points = self._texture(2, "f4")
+            self._atlas_positions = self._texture(2, "f4")
             self._depths = self._texture(1, "f4")
             self._visibility = self._texture(1, "u4")
             self._light = self._texture(1, "u4")
@@ -151,7 +157,13 @@ class VisibilityBuffer:
             self._damaged = self._framebuffer()
 
     def _framebuffer(self) -> moderngl.Framebuffer:
-        usual = [self._keys, self._points, self._depths, self._visibility, self._light]
+        usual = [
+            self._surface_ids,
+            self._atlas_positions,
+            self._depths,
+            self._visibility,
+            self._light,
+        ]
         made: moderngl.Framebuffer = self._ctx.framebuffer([*usual, *self._rest], self.depth_buffer)
         return self._own(made)
 

@@ -20,7 +20,7 @@ from fastgen.scene import Pose
 from fastgen.scene.boxes import rotation_of
 from fastgen.scene.limits import MM
 
-_NO_KEY = (ctypes.c_uint * 4)(0)
+_NO_SURFACE = (ctypes.c_uint * 4)(0)
 
 _POINTS_PER_AXIS = 400
 """Most points along each axis of a square image: rays cost no more in larger images."""
@@ -60,11 +60,11 @@ class RayPass:
         width, height = (-(-(side - step // 2) // step) for side in size)
         self._rows = height
         self._cells = cells = (width, 2 * height)
-        self._keys = ctx.texture(cells, 1, dtype="u4")
+        self._surface_ids = ctx.texture(cells, 1, dtype="u4")
         self._places, self._normals = (ctx.texture(cells, 4, dtype="f4") for _ in range(2))
-        self._target = ctx.framebuffer([self._keys, self._places, self._normals])
+        self._target = ctx.framebuffer([self._surface_ids, self._places, self._normals])
         self._light = ctx.texture_array((*cells, 4), 4, dtype="f4")
-        for texture in (self._keys, self._places, self._normals, self._light):
+        for texture in (self._surface_ids, self._places, self._normals, self._light):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._clear_uint = gl.function(
             "glClearBufferuiv", None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
@@ -86,7 +86,7 @@ class RayPass:
         if inputs.view.distortion is not None:
             points = replace(points, place_mm=bodies.settled(points.place_mm, points.normal))
         self._store(points, traced_light(points, bodies, sky, yaw_deg))
-        inputs.textures["ray_point_ids"] = self._keys
+        inputs.textures["ray_point_ids"] = self._surface_ids
         inputs.textures["ray_point_positions"] = self._places
         inputs.textures["ray_point_light"] = self._light
 
@@ -94,8 +94,8 @@ class RayPass:
         """Return the points of the visible surfaces in the frame of the view."""
         self._draw(inputs)
         width, height = self._cells
-        keys = np.frombuffer(self._keys.read(alignment=1), np.uint32).reshape(height, width)
-        row, column = np.nonzero(keys)
+        ids = np.frombuffer(self._surface_ids.read(alignment=1), np.uint32).reshape(height, width)
+        row, column = np.nonzero(ids)
         places, normals = (
             np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)[row, column]
             for texture in (self._places, self._normals)
@@ -128,7 +128,7 @@ class RayPass:
         program["last_pixel"] = tuple(side - 1 for side in self._size)
         self._target.use()
         self._ctx.scissor = None
-        self._clear_uint(GL_COLOR, 0, _NO_KEY)
+        self._clear_uint(GL_COLOR, 0, _NO_SURFACE)
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         program.bind(inputs.textures)
         for region in inputs.regions.drawn:
@@ -151,5 +151,5 @@ class RayPass:
 
     def release(self) -> None:
         """Free all GL objects."""
-        for item in (self._target, self._keys, self._places, self._normals, self._light):
+        for item in (self._target, self._surface_ids, self._places, self._normals, self._light):
             item.release()
