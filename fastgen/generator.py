@@ -57,7 +57,8 @@ class Generator:
 
     A context manager; the GL context opens at the first render. Threads may share a generator and
     draw in turn. A process that is forked off, or that receives a pickled generator, opens its own
-    context. What a generator held that was dropped unclosed is freed when the next one opens.
+    context. If a generator is dropped without `close`, its GL objects are freed when the next
+    generator of this process opens its context.
 
     Attributes:
         config: Distribution of the scenes.

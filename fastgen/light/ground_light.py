@@ -108,15 +108,16 @@ def _damp_share(wetness: float) -> float:
 
 
 def left_of_sky(whole: ArrayLike, left: ArrayLike, share: ArrayLike) -> NDArray[np.floating]:
-    """Return the light that something leaves of the sky's, from two estimates.
+    """Return the sky light that remains behind occluders.
 
-    The radiance of the hidden sky is known only roughly. Therefore the result may differ less from
-    `share * whole` if less is left. All shapes broadcast.
+    It is `left`, limited to [1 / (1 + share), 1 + share] times the estimate for an even sky,
+    `share * whole`. The limits are narrower where less sky is visible, because the radiance of the
+    hidden sky is only known roughly. All shapes broadcast.
 
     Args:
         whole: Light of the whole sky.
         left: The same without the light that is estimated to be hidden.
-        share: Share that would be left of an even sky.
+        share: Share of an even sky's light that would remain.
     """
     even = np.asarray(whole) * share
     most = 1 + np.asarray(share)

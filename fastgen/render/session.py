@@ -20,7 +20,8 @@ class GpuSession:
     """A GL context with a renderer on it, current only while it draws.
 
     Threads take turns. A process that is forked off leaves its parent's context alone and opens its
-    own. What a session that was dropped unclosed held is freed when the next session opens.
+    own. If a session is dropped without `close`, its GL objects are freed when the next session of
+    this process opens its context.
     """
 
     def __init__(
