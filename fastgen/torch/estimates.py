@@ -13,7 +13,7 @@ from fastgen.geometry.damage_law import amount_mm, faces, in_hole, is_marked
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.labels.hasp_crops import hasp_points_mm, is_sealed, shown_hasps
 from fastgen.labels.visibility import too_little
-from fastgen.sampling.sight import points_toward
+from fastgen.sampling.visibility_estimates import points_toward
 from fastgen.scene import Camera, Damage, Decal, Pose, Scene
 from fastgen.scene.boxes import OrientedBox, container_box
 from fastgen.scene.limits import MM
