@@ -13,7 +13,7 @@ from fastgen.formats.door import door_number
 from fastgen.formats.seal import SEAL_CLASSES
 from fastgen.generator import Generator
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.torch.estimates import ContainerSight, container_sights
+from fastgen.torch.estimates import ContainerEstimate, container_estimates
 from fastgen.torch.plan import chosen_cameras
 from fastgen.torch.targets import class_names
 from fastgen.validation import whole
@@ -72,10 +72,10 @@ def class_counts(
             if task == "door":
                 counts[door_number(camera)] += 1
                 continue
-            sights = container_sights(prepared, camera, size, config)
+            estimates = container_estimates(prepared, camera, size, config)
             # only the first container has door and seal crops
-            for sight in islice(sights, 1) if task == "seal" else sights:
-                for label in _labels(task, sight):
+            for estimate in islice(estimates, 1) if task == "seal" else estimates:
+                for label in _labels(task, estimate):
                     counts[names.index(label)] += 1
     return torch.from_numpy(counts)
 
@@ -112,14 +112,14 @@ def class_weights(
     return counts.sum() / (len(counts) * counts.clamp(min=1)).float()
 
 
-def _labels(task: str, sight: ContainerSight) -> Iterator[str]:
+def _labels(task: str, estimate: ContainerEstimate) -> Iterator[str]:
     """Yield the class name of each label of one container in one image."""
     if task == "seal":
-        yield from (SEAL_CLASSES[sealed] for sealed in sight.hasps())
+        yield from (SEAL_CLASSES[sealed] for sealed in estimate.hasps())
         return
-    if sight.container():
+    if estimate.container():
         yield "container"
     if task == "damage":
-        yield from (damage.kind for damage in sight.damages())
+        yield from (damage.kind for damage in estimate.damages())
     else:
-        yield from (decal.class_name for decal in sight.decals())
+        yield from (decal.class_name for decal in estimate.decals())

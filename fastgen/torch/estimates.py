@@ -26,7 +26,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class ContainerSight:
+class ContainerEstimate:
     """One container of a scene in one image.
 
     All points are in the frame of the container. Only the outer boxes of other containers hide
@@ -115,9 +115,9 @@ class ContainerSight:
         return not too_little(self.config, self.view.size, pixels, whole)
 
 
-def container_sights(
+def container_estimates(
     prepared: PreparedScene, camera: Camera, size: tuple[int, int], config: Config
-) -> Iterator[ContainerSight]:
+) -> Iterator[ContainerEstimate]:
     """Yield each container of a scene as a camera sees it, the first container before the others.
 
     Args:
@@ -131,7 +131,7 @@ def container_sights(
         others = tuple(
             other.box.in_frame(member.pose) for other in prepared.members if other is not member
         )
-        yield ContainerSight(member.prepared, view.in_frame(member.pose), others, config)
+        yield ContainerEstimate(member.prepared, view.in_frame(member.pose), others, config)
 
 
 def _damage_points_mm(damage: Damage) -> Array:
