@@ -16,7 +16,8 @@ class Frame:
             spreader, ground and props; 255 is all of it.
         ids: uint16 [H, W], object id at the pixel centre, 0 for ground, props and panorama.
         damage: uint16 [H, W], category * 100 + instance at the pixel centre, see
-            classes.ALL_SEGMENTATION_CLASSES. The first undamaged container has 101; 0 elsewhere.
+            classes.ALL_SEGMENTATION_CLASSES. Undamaged surface of the first container has
+            101, of the next 102; pixels without a container have 0.
         depth: float32 [H, W], metres along the optical axis, inf where the pixel centre shows the
             panorama.
         radiance: float32 [H, W, 3], linear Rec. 709 after exposure and before the tone curve;

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from fastgen.classes import ALL_DETECTION_CLASSES, ALL_SEGMENTATION_CLASSES
+from fastgen.classes import ALL_SEGMENTATION_CLASSES
 from fastgen.errors import ConfigError, FastgenError, nearest, shown
 from fastgen.sample import Sample
 
 Postprocess = Callable[[Sample, np.random.Generator], Sample]
 """Takes a sample and a random generator of its own, and returns the changed sample."""
 
-_CLASSES = (*ALL_DETECTION_CLASSES, *ALL_SEGMENTATION_CLASSES, "spreader", "seal")
-"""Classes that objects of any configuration may have."""
+_CLASSES = (*ALL_SEGMENTATION_CLASSES, "spreader", "seal")
+"""Classes of objects besides those of the marker task."""
 
 _ARRAYS = ("image", "ids", "damage", "depth")
 """Arrays that keep their shape and type."""
@@ -87,8 +87,9 @@ def _check_objects(sample: Sample, made: Sample, name: str) -> None:
                 f"postprocess: {name} returned an object of the class {shown(item.class_name)}"
                 f"{nearest(item.class_name, known)}"
             )
-        x0, y0, x1, y1 = item.bbox or (0, 0, width, height)
-        if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+        box = item.bbox or (0, 0, width, height)
+        inside = len(box) == 4 and 0 <= box[0] < box[2] <= width and 0 <= box[1] < box[3] <= height
+        if not inside:
             raise FastgenError(
                 f"postprocess: {name} returned the box {item.bbox} of {item.class_name}; give x0 < "
                 f"x1 and y0 < y1 within {width}x{height} pixels, or None"

@@ -187,10 +187,10 @@ def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
 
 
 def flag(name: str, value: Any) -> bool:
-    """Return `value` as a bool if it is one of Python or NumPy.
+    """Return a boolean of Python or NumPy as a bool.
 
     Raises:
-        ConfigError: otherwise; the message starts with `name`.
+        ConfigError: `value` is not a boolean. The message starts with `name`.
     """
     if not isinstance(value, bool | np.bool_):
         raise ConfigError(f"{name}: expected true or false, got {shown(value)}")

@@ -1,6 +1,6 @@
 // Twin of fastgen/camera/lens.py.
 // vec4 lens_distorted(vec4 clip): clip position after the lens distortion.
-// vec2 undistorted(vec2 pixel): undistorted position of a pixel of the image; the inverse of it.
+// vec2 undistorted(vec2 pixel): undistorted position of a pixel of the image; inverse of lens_distorted().
 // Brown-Conrady and fisheye (Kannala-Brandt) models with OpenCV's coefficients. Far outside the image
 // the radial polynomial continues as a straight line.
 

@@ -1,5 +1,5 @@
 // Shaded shade_behind(ivec2 pixel, vec3 ray): what lies behind the container at a pixel: the sky, or with
-// OVER the image as it is, with the coverage by the bodies that it shows.
+// OVER the image as it is, with its coverage.
 // vec3 blend_over(vec3 color, Shaded behind, float share): display colour of a pixel of which `share` shows
 // what lies behind, and the rest exposed radiance `color`.
 

@@ -1,5 +1,6 @@
 // Shaded shade_mixed(ivec2 pixel, out bool at_body): a pixel whose samples see different surfaces, or the
-// sky beside them. Its colour is display colour already. at_body: A surface is at the pixel's centre.
+// sky beside them. Its colour is display colour, or with RADIANCE exposed radiance. at_body: A surface
+// is at the pixel's centre.
 
 #include "lookups.constants"
 #include "samples.constants"

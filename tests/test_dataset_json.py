@@ -102,6 +102,19 @@ def test_shards_without_dataset_json_tell_which_options_to_repeat(copy, capsys, 
     assert content(copy) == before
 
 
+def test_an_unfinished_dataset_of_an_older_version_names_that_version(copy, capsys):
+    path = copy / "dataset.json"
+    unfinished(path, version="0.44.0")
+    said = json.loads(path.read_text())
+    for newer in ("stems", "coco_masks"):
+        del said[newer]
+    path.write_text(json.dumps(said))
+    for number in range(3):
+        (copy / f"shards/{number:06d}.json").unlink()
+    assert run(copy) == 2
+    assert "install fastgen 0.44.0 to resume" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("option", "values"),
     [("--stems", ("seed", "short")), ("--coco-masks", ("polygon", "rle"))],

@@ -359,6 +359,8 @@ def renamed(sample, rng):
     return replace(sample, objects=[replace(sample.objects[0], class_name="spreadr")])
 def emptied(sample, rng):
     return replace(sample, objects=[replace(sample.objects[0], bbox=(5, 5, 2, 2))])
+def cut(sample, rng):
+    return replace(sample, objects=[replace(sample.objects[0], bbox=(1, 2))])
 NUMBER = 1
 """
 
@@ -390,6 +392,7 @@ def faulty(tmp_path_factory):
             "postprocess: faulty:renamed returned an object of the class 'spreadr' (did you mean "
             "spreader?)",
         ),
+        ("faulty:cut", "postprocess: faulty:cut returned the box (1, 2) of"),
         ("faulty:emptied", "postprocess: faulty:emptied returned the box (5, 5, 2, 2) of"),
     ],
 )

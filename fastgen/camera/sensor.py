@@ -106,7 +106,10 @@ def apply_camera_model(
 
 
 def _rain_of(rain: Rain, camera: Camera, exposure: Exposure) -> Rain:
-    """Return the rain that a camera sees: drops of its own, during the exposure of its meter."""
+    """Return the rain in a camera's image: drops of its own.
+
+    A meter's shutter time is that before highlights lower it, because rain may be a highlight.
+    """
     own = np.random.SeedSequence((rain.seed, crc32(camera.name.encode()))).generate_state(1)
     return replace(rain, seed=int(own[0]), shutter_s=exposure.shutter_s or rain.shutter_s)
 

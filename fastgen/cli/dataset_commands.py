@@ -29,6 +29,7 @@ from fastgen.dataset.repair import repair
 from fastgen.dataset.settings import parse_split
 from fastgen.dataset.stats import report, statistics
 from fastgen.dataset.verify import examine
+from fastgen.errors import one_line
 from fastgen.formats.registry import SEAFRONT, format_names, known_formats
 
 _GENERATE = """\
@@ -254,7 +255,7 @@ def _generate(options: argparse.Namespace) -> int:
     summarize(options, result, lines)
     if options.quiet:
         for failure in failures:
-            say(f"fastgen: {failure}")
+            say(one_line(f"fastgen: {failure}"))
     return 1 if manifest["failed"] else 0
 
 

@@ -63,8 +63,8 @@ class ContainerConfig:
         depth_scale: Factors of the corrugation depth; all are equally likely. This is a list and
             not a range because each factor needs a mesh of its own. Depths that do not fit the
             frame are refused.
-        absent: Share of scenes without a container. They show only the surroundings, without a
-            spreader, and have no labels.
+        absent: Share of scenes without a container. They show only the panorama and the ground,
+            without a spreader, and have no labels.
     """
 
     kinds: dict[Annotated[str, OneOf(tuple(KINDS))], Weight] = field(
@@ -86,7 +86,7 @@ class ContainerConfig:
 
 @dataclass(frozen=True)
 class EnvironmentConfig:
-    """Light of the surroundings.
+    """The panorama and its light.
 
     Attributes:
         names: HDRIs to draw from, all equally likely, by file name without extension; assets/hdri

@@ -23,6 +23,9 @@ _words.maxlist = _words.maxdict = 100  # cameras, formats, HDRIs: the last may b
 
 _MISSING = object()
 
+_NEWER = {"stems", "coco_masks"}
+"""Settings that the dataset.json of version 0.44 or earlier may lack."""
+
 _SHOWN = 10
 """Number of differing settings that an error message lists with their values."""
 
@@ -82,7 +85,7 @@ def existing(storage: Storage, job: Job, settings: Mapping[str, Any]) -> dict[st
     made_with = {manifest["settings"] for manifest in manifests if manifest is not None}
     if made_with == {job.settings_digest}:
         return None
-    if found is not None and found.keys() >= settings.keys():
+    if found is not None and found.keys() >= settings.keys() - _NEWER:
         raise OutputError(_differ_message(job, settings, found))
     if made_with:
         for old in _likely_settings(storage, settings):

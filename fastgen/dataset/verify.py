@@ -100,7 +100,7 @@ def examine(out: str) -> Findings:
         if not _is_intact(storage, present, path, size, hashed, faults):
             broken.add(path)
     manifests = (manifest_path(int(number)) for number in manifest["shards"])
-    ours = {MANIFEST, *manifests, *broken, *(path for files in listed for path in files)}
+    ours = {MANIFEST, *manifests, *(path for files in listed for path in files)}
     if unlisted:  # some of the other files may be theirs
         ours.update(filter(_SAMPLE.fullmatch, present))
     foreign = _foreign(present.keys() - ours, ours)

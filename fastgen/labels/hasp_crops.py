@@ -77,7 +77,7 @@ def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
 
 
 def hasp_points_mm(scene: Scene) -> NDArray[np.float64]:
-    """Return a grid of points over each crop of the first container's hasps.
+    """Return a grid of points over the crop of each hasp of the scene's container.
 
     Args:
         scene: A scene with a container.

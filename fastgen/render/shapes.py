@@ -50,7 +50,7 @@ class Shapes:
         materials: SceneMaterials,
         lens: bool,
         light: Ambient,
-        surroundings: SurroundingLight | None = None,
+        light_change: SurroundingLight | None = None,
     ) -> tuple[GpuMesh, GpuMesh | None, LitMesh]:
         """Return the container and spreader of a scene, ready to be drawn.
 
@@ -59,7 +59,7 @@ class Shapes:
             materials: Its materials.
             lens: Whether the image has lens distortion.
             light: Light of the scene's environment.
-            surroundings: What other containers and the ground change in the light on the container.
+            light_change: Change of the light on the container by other containers and the ground.
 
         Returns:
             The container, the spreader or None, and the light at the vertices of the container,
@@ -67,8 +67,8 @@ class Shapes:
         """
         mesh, shape = self.container(prepared), prepared.spreader
         below, *above = self.light(prepared, materials, lens, light)
-        if surroundings is not None:
-            below = self._in_surroundings(prepared, below, _sky_of(prepared, light), surroundings)
+        if light_change is not None:
+            below = self._changed(prepared, below, _sky_of(prepared, light), light_change)
         mesh.set_sky_visibility(below.values)
         if shape is None:
             return mesh, None, below
@@ -98,18 +98,18 @@ class Shapes:
         )
         return below, above
 
-    def _in_surroundings(
-        self, prepared: PreparedScene, below: LitMesh, sky: Sky, surroundings: SurroundingLight
+    def _changed(
+        self, prepared: PreparedScene, below: LitMesh, sky: Sky, light_change: SurroundingLight
     ) -> LitMesh:
-        """Return a container, lit in the open, with its vertex bytes in these surroundings."""
+        """Return a container, lit in the open, with vertex bytes for the changed light."""
 
         def make() -> LitMesh:
             visibility = self._visibility(below.mesh, prepared)
             open_, light = below.values, below.without_lights
-            values = surroundings.applied(visibility, sky, open_, light, below.mesh)
+            values = light_change.applied(visibility, sky, open_, light, below.mesh)
             return replace(below, values=values)
 
-        return self._surrounded.get((below, surroundings), make)
+        return self._surrounded.get((below, light_change), make)
 
     def _visibility(self, mesh: Mesh, prepared: PreparedScene) -> SkyVisibility:
         return self._probe.container_visibility(

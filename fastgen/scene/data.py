@@ -99,8 +99,8 @@ class Container:
     Attributes:
         kind: Key of KINDS.
         profiles: Corrugation of the walls.
-        present: False for a scene that shows only the surroundings. Cameras are placed as if the
-            container was there. Such a scene has no decals, damages, seals or spreader.
+        present: False for a scene that shows only the panorama and the ground. Cameras are placed
+            as if the container was there. Such a scene has no decals, damages, seals or spreader.
     """
 
     kind: Annotated[str, OneOf(tuple(KINDS))]

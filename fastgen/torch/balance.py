@@ -34,7 +34,7 @@ def class_counts(
     labels.min_visible_fraction.
 
     A hasp of the first container counts if its crop is estimated to be inside the image, large
-    and not hidden.
+    and not hidden. For door, each image counts once, by the end that its camera looks at.
 
     Occlusion is approximate: containers hide each other as boxes, and spreader, vehicles, door
     gear, and corrugation hide nothing. Containers of the panorama are not counted, although
@@ -73,7 +73,7 @@ def class_counts(
                 counts[door_number(camera)] += 1
                 continue
             estimates = container_estimates(prepared, camera, size, config)
-            # only the first container has door and seal crops
+            # only hasps of the first container get crops
             for estimate in islice(estimates, 1) if task == "seal" else estimates:
                 for label in _labels(task, estimate):
                     counts[names.index(label)] += 1

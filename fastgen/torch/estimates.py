@@ -1,4 +1,4 @@
-"""Estimates of which labels an image has, from its scene alone, without rendering."""
+"""Estimates of the labels of an image from its scene, without rendering."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class ContainerEstimate:
     config: Config
 
     def shown(self, points_mm: Array) -> Mask:
-        """Return whether the image shows points [..., 3]: nothing hides them, and no fog."""
+        """Return which points [..., 3] the image shows: not behind another container or in fog."""
         shown = self._inside(points_mm)
         for box in self.others:
             shown &= ~box.between(self._eye_mm, points_mm)

@@ -29,7 +29,7 @@ _AT_AN_END = (
     "give a camera with face door or no_door whose azimuth_deg and elevation_deg together keep it "
     "within 45 degrees of the long axis"
 )
-"""How to get cameras that suit the door task."""
+"""Advice in errors about cameras of the door task."""
 
 
 @dataclass(frozen=True)
