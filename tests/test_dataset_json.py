@@ -106,7 +106,7 @@ def test_an_unfinished_dataset_of_an_older_version_names_that_version(copy, caps
     path = copy / "dataset.json"
     unfinished(path, version="0.44.0")
     said = json.loads(path.read_text())
-    for newer in ("stems", "coco_masks"):
+    for newer in ("stems", "coco_masks"):  # the oldest versions lack them
         del said[newer]
     path.write_text(json.dumps(said))
     for number in range(3):

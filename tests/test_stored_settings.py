@@ -55,6 +55,7 @@ def test_settings_of_a_job_are_stored_as_in_0_23(monkeypatch):
         cameras=("A", "Cr"),
         render=RenderSettings((96, 64)),
         also=("voc", "depth"),
+        shard_scenes=4,
         stems="short",
         coco_masks="rle",
     )

@@ -18,13 +18,13 @@ from fastgen.render.settings import QUALITY
 
 MANIFEST = "dataset.json"
 
+WITHOUT_KEY = {"stems": "short", "coco_masks": "rle"}
+"""Values of settings that are stored without their key, because the oldest datasets lack it."""
+
 _words = reprlib.Repr()
 _words.maxlist = _words.maxdict = 100  # cameras, formats, HDRIs: the last may be what differs
 
 _MISSING = object()
-
-_NEWER = {"stems", "coco_masks"}
-"""Settings that the dataset.json of version 0.44 or earlier may lack."""
 
 _SHOWN = 10
 """Number of differing settings that an error message lists with their values."""
@@ -71,7 +71,7 @@ def existing(storage: Storage, job: Job, settings: Mapping[str, Any]) -> dict[st
     except FileNotFoundError:
         text, problem = b"", f"no {MANIFEST}"
     found = parsed(text)
-    if found is not None and _same({key: found.get(key) for key in settings}, settings):
+    if found is not None and not any(_unlike(found, settings)):
         return found
     if found is not None and "merged_from" in found:
         raise OutputError(
@@ -85,7 +85,7 @@ def existing(storage: Storage, job: Job, settings: Mapping[str, Any]) -> dict[st
     made_with = {manifest["settings"] for manifest in manifests if manifest is not None}
     if made_with == {job.settings_digest}:
         return None
-    if found is not None and found.keys() >= settings.keys() - _NEWER:
+    if found is not None and found.keys() | WITHOUT_KEY.keys() >= settings.keys():
         raise OutputError(_differ_message(job, settings, found))
     if made_with:
         for old in _likely_settings(storage, settings):
@@ -181,8 +181,7 @@ def _same(old: Any, new: Any) -> bool:
 
 
 def _differ_message(job: Job, settings: Mapping[str, Any], found: Mapping[str, Any]) -> str:
-    old = {key: found.get(key, _MISSING) for key in settings}
-    unlike = [each for key in settings for each in _differences(key, old[key], settings[key])]
+    unlike = [*_unlike(found, settings)]
     shown = [f"{name} was {before}, is now {now}" for name, before, now in unlike[:_SHOWN]]
     if len(unlike) > _SHOWN:
         shown.append(f"and {len(unlike) - _SHOWN} more")
@@ -195,6 +194,15 @@ def _differ_message(job: Job, settings: Mapping[str, Any], found: Mapping[str, A
         f"{job.out}: was made with other settings ({'; '.join(shown)}); "
         f"{how}, or give another folder"
     )
+
+
+def _unlike(
+    found: Mapping[str, Any], settings: Mapping[str, Any]
+) -> Iterator[tuple[str, str, str]]:
+    """Yield name, old and new value of each setting of a dataset.json that differs."""
+    for key in {**settings, **WITHOUT_KEY}:
+        old, new = (each.get(key, WITHOUT_KEY.get(key, _MISSING)) for each in (found, settings))
+        yield from _differences(key, old, new)
 
 
 def _options(name: str) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fastgen.config.config import Config, SplitConfig
-from fastgen.dataset.dataset_json import unsealed
+from fastgen.dataset.dataset_json import WITHOUT_KEY, unsealed
 from fastgen.dataset.job import COCO_MASKS, LAYOUTS, STEMS, Job
 from fastgen.dataset.progress import Progress
 from fastgen.dataset.seal import digest
@@ -139,11 +139,11 @@ def _settings(job: Job) -> dict[str, Any]:
         "shard_scenes": job.scenes_per_shard,
         "classes": generator.config.classes,
         "config": generator.config.to_plain(),
-        "stems": job.stems,
-        "coco_masks": job.coco_masks,
     }
     name = generator.config.postprocess
     if name:
         settings["postprocess"] = {"function": name, "sha256": source_hash(name)}
+    given = {"stems": job.stems, "coco_masks": job.coco_masks}
+    settings |= {key: value for key, value in given.items() if value != WITHOUT_KEY[key]}
     plain: dict[str, Any] = json.loads(json.dumps(settings))
     return plain
