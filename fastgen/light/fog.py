@@ -86,7 +86,7 @@ def transmitted(optical_depth: float, cosine: float) -> tuple[float, float]:
 
 
 def _rounded(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return radiance as EnvironmentLight holds it."""
+    """Return radiance in the precision of an EnvironmentLight."""
     return half_floats(radiance).astype(np.float32)
 
 

@@ -46,13 +46,7 @@ class ContainerEstimate:
 
     def shown(self, points_mm: Array) -> Mask:
         """Return which points [..., 3] the image shows: not behind another container or in fog."""
-        shown = self._inside(points_mm)
-        for box in self.others:
-            shown &= ~box.between(self._eye_mm, points_mm)
-        visibility_mm = self._scene.weather.visibility_mm
-        if visibility_mm:
-            shown &= np.linalg.norm(points_mm - self._eye_mm, axis=-1) <= visibility_mm
-        return shown
+        return self._projected(points_mm)[2] & ~self._hidden(points_mm)
 
     def container(self) -> bool:
         """Return whether the container is labelled, from points on its outer box."""
@@ -82,10 +76,11 @@ class ContainerEstimate:
     def decals(self) -> Iterator[Decal]:
         """Yield the decals that are labelled, from points along their outlines."""
         decals, outlines = self.prepared.decals.decals, self.prepared.decals.outlines_mm
-        pixels, depth = self.view.project(outlines)
+        pixels, depth, inside = self._projected(outlines)
         # y points down, so an outline that is counter-clockwise on its sheet has a negative area
         wholes = np.where((depth > 0).all(axis=-1), -_areas_px(pixels), 0.0)
-        shares = self.shown(outlines).sum(axis=-1) / max(outlines.shape[1], 1)
+        shown = inside & ~self._hidden(outlines)
+        shares = shown.sum(axis=-1) / max(outlines.shape[1], 1)
         for decal, share, whole in zip(decals, shares, wholes, strict=True):
             if self._labelled(share * whole, whole):
                 yield decal
@@ -93,9 +88,9 @@ class ContainerEstimate:
     def hasps(self) -> Iterator[bool]:
         """Yield True or False, sealed or open, for each hasp of the door that gets a crop."""
         points_mm = hasp_points_mm(self._scene)
-        pixels, _ = self.view.project(points_mm)
+        pixels, _, inside = self._projected(points_mm)
         seals = {seal.hasp: seal for seal in self._scene.seals}
-        for hasp, _ in shown_hasps(pixels, self._inside(points_mm), self.shown(points_mm)):
+        for hasp, _ in shown_hasps(pixels, inside, inside & ~self._hidden(points_mm)):
             yield is_sealed(seals.get(hasp))
 
     @property
@@ -106,10 +101,21 @@ class ContainerEstimate:
     def _eye_mm(self) -> Array:
         return self.view.position_m / MM
 
-    def _inside(self, points_mm: Array) -> Mask:
+    def _projected(self, points_mm: Array) -> tuple[Array, Array, Mask]:
+        """Return pixels [..., 2] and depth [...] of points, and whether they are in the image."""
         pixels, depth = self.view.project(points_mm)
         inside: Mask = (depth > 0) & ((pixels >= 0) & (pixels < self.view.size)).all(axis=-1)
-        return inside
+        return pixels, depth, inside
+
+    def _hidden(self, points_mm: Array) -> Mask:
+        """Return which points [..., 3] are behind another container or in fog."""
+        hidden: Mask = np.zeros(points_mm.shape[:-1], bool)
+        for box in self.others:
+            hidden |= box.between(self._eye_mm, points_mm)
+        visibility_mm = self._scene.weather.visibility_mm
+        if visibility_mm:
+            hidden |= np.linalg.norm(points_mm - self._eye_mm, axis=-1) > visibility_mm
+        return hidden
 
     def _labelled(self, pixels: float, whole: float) -> bool:
         return not too_little(self.config, self.view.size, pixels, whole)
